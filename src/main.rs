@@ -1,0 +1,5 @@
+//! The `vargeo` program: reads its arguments and hands them to the command that they name.
+
+fn main() -> std::process::ExitCode {
+    vargeo::cli::main()
+}

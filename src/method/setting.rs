@@ -1,0 +1,56 @@
+//! Settings declared as data: names, kinds, defaults and documentation of everything an experiment file may hold.
+//!
+//! One declaration serves the diagnostics, the defaults, the key, `vargeo schema` and `vargeo list settings`.
+
+/// A named entry of a table in the experiment file.
+#[derive(Debug)]
+pub struct Field {
+    pub name: &'static str,
+    pub kind: Kind,
+    pub default: Default,
+    /// One or two sentences: meaning, unit, source.
+    pub doc: &'static str,
+}
+
+/// What a field holds.
+#[derive(Debug)]
+pub enum Kind {
+    Boolean,
+    /// Whole number within `[min, max]`.
+    Integer { min: i64, max: i64 },
+    /// Finite number within `[min, max]`; a whole number in the file is taken as a number.
+    Number { min: f64, max: f64 },
+    /// One of a list of words, each with a one-line meaning.
+    Choice(&'static [(&'static str, &'static str)]),
+    /// Words known at run time, such as the energies: the function lists them with their meanings.
+    Named(fn() -> Vec<(&'static str, String)>),
+    /// Free text.
+    Text,
+    /// `"10 min"`: held as seconds.
+    Duration,
+    /// `"8 GiB"`: held as bytes.
+    Size,
+    /// Path of an input file, relative to the experiment file or to a models folder.
+    File,
+    /// A table with these fields.
+    Table(&'static [Field]),
+    /// A table with one of several sets of fields: the choice is the key, `{ generate = "ball", ... }` has none of this.
+    List(&'static Kind),
+    /// Any of these kinds, tried in order by TOML type; at most one per TOML type.
+    OneOf(&'static [Kind]),
+}
+
+/// What stands in when the file is silent.
+#[derive(Debug)]
+pub enum Default {
+    /// An error when absent.
+    Required,
+    /// Left out of the resolved job when absent.
+    Absent,
+    Boolean(bool),
+    Integer(i64),
+    Number(f64),
+    Text(&'static str),
+    /// A table filled with its fields' own defaults.
+    Fields,
+}

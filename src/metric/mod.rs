@@ -1,0 +1,26 @@
+//! What is measured of a result: each metric has a name, a unit, a floor, a better direction and a definition.
+
+/// Which way a metric improves.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Better {
+    Lower,
+    Higher,
+    /// Descriptive only, such as a count of vertices.
+    Neither,
+}
+
+/// Definition of a metric, as printed by `vargeo list metrics` and written over table columns.
+#[derive(Clone, Copy, Debug)]
+pub struct Metric {
+    /// The name in tables, `expect` and `jobs.csv`: `d_ma`.
+    pub name: &'static str,
+    /// Typeset name for headings: `D_ma`.
+    pub symbol: &'static str,
+    /// `""` for a pure number.
+    pub unit: &'static str,
+    /// The best value that any result can have, if there is one.
+    pub floor: Option<f64>,
+    pub better: Better,
+    /// One or two sentences with the formula and its source.
+    pub definition: &'static str,
+}

@@ -1,2 +1,59 @@
-//! The command line: one command a file.
-pub fn main() -> std::process::ExitCode { std::process::ExitCode::SUCCESS }
+//! The command line: one command a file, each with its arguments and its `execute`.
+
+mod list;
+
+use clap::{Parser, Subcommand};
+use std::process::ExitCode;
+
+/// How the program ends, as documented in `vargeo help`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Exit {
+    /// All well.
+    Well = 0,
+    /// An expectation was not met.
+    ExpectationFailed = 1,
+    /// A job failed.
+    JobFailed = 2,
+    /// The experiment file, an input or the command line is wrong.
+    FileWrong = 3,
+    /// There was nothing to run.
+    NothingRan = 4,
+    /// Stopped by Ctrl-C or SIGTERM; what is finished is kept.
+    Interrupted = 130,
+}
+
+/// Runs batches of geometry experiments described in TOML.
+#[derive(Parser)]
+#[command(name = "vargeo", version, about, after_help = EXIT_CODES)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+const EXIT_CODES: &str = "Exit codes: 0 all well, 1 an expectation was not met, 2 a job failed, \
+3 the file or the command line is wrong, 4 nothing ran, 130 interrupted.";
+
+#[derive(Subcommand)]
+enum Command {
+    List(list::Arguments),
+}
+
+/// Reads the process's arguments and runs the command that they name.
+pub fn main() -> ExitCode {
+    let arguments = match Arguments::try_parse() {
+        Ok(arguments) => arguments,
+        Err(error) => {
+            let _ = error.print();
+            let exit = if error.use_stderr() {
+                Exit::FileWrong
+            } else {
+                Exit::Well
+            };
+            return ExitCode::from(exit as u8);
+        }
+    };
+    let exit = match arguments.command {
+        Command::List(arguments) => list::execute(arguments),
+    };
+    ExitCode::from(exit as u8)
+}

@@ -14,7 +14,11 @@ pub enum JobPart {
     /// A generator with all its parameters.
     Generated { generator: String, parameters: Value },
     /// The content of a file.
-    File { sha256: String, format: String, parameters: Value },
+    File {
+        sha256: String,
+        format: String,
+        parameters: Value,
+    },
 }
 
 /// Everything that decides a result.

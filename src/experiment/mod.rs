@@ -4,4 +4,5 @@
 
 pub mod file;
 pub mod job;
+pub mod plan;
 pub mod record;

@@ -111,7 +111,10 @@ mod numbers {
     use std::collections::BTreeMap;
 
     pub fn serialize<S: Serializer>(map: &BTreeMap<String, f64>, serializer: S) -> Result<S::Ok, S::Error> {
-        map.iter().map(|(name, &value)| (name, super::word::write(value))).collect::<BTreeMap<_, _>>().serialize(serializer)
+        map.iter()
+            .map(|(name, &value)| (name, super::word::write(value)))
+            .collect::<BTreeMap<_, _>>()
+            .serialize(serializer)
     }
 
     pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<BTreeMap<String, f64>, D::Error> {
@@ -131,7 +134,15 @@ mod columns {
 
     pub fn serialize<S: Serializer>(map: &BTreeMap<String, Vec<f64>>, serializer: S) -> Result<S::Ok, S::Error> {
         map.iter()
-            .map(|(name, values)| (name, values.iter().map(|&value| super::word::write(value)).collect::<Vec<_>>()))
+            .map(|(name, values)| {
+                (
+                    name,
+                    values
+                        .iter()
+                        .map(|&value| super::word::write(value))
+                        .collect::<Vec<_>>(),
+                )
+            })
             .collect::<BTreeMap<_, _>>()
             .serialize(serializer)
     }
@@ -141,7 +152,9 @@ mod columns {
             .into_iter()
             .map(|(name, values)| {
                 let column: Option<Vec<f64>> = values.iter().map(super::word::read).collect();
-                column.map(|column| (name.clone(), column)).ok_or_else(|| D::Error::custom(format!("trace {name} holds no numbers")))
+                column
+                    .map(|column| (name.clone(), column))
+                    .ok_or_else(|| D::Error::custom(format!("trace {name} holds no numbers")))
             })
             .collect()
     }

@@ -36,9 +36,16 @@ pub struct ModelKind {
 #[derive(Debug, Clone, PartialEq)]
 pub enum Part {
     /// A generator's name and its validated parameters, defaults filled.
-    Generated { generator: String, parameters: serde_json::Value },
+    Generated {
+        generator: String,
+        parameters: serde_json::Value,
+    },
     /// A file's bytes with the name to use in messages and its extension-derived or sniffed format.
-    File { name: String, bytes: Vec<u8>, parameters: serde_json::Value },
+    File {
+        name: String,
+        bytes: Vec<u8>,
+        parameters: serde_json::Value,
+    },
 }
 
 /// The parts of a model by role name.

@@ -17,9 +17,15 @@ pub struct Field {
 pub enum Kind {
     Boolean,
     /// Whole number within `[min, max]`.
-    Integer { min: i64, max: i64 },
+    Integer {
+        min: i64,
+        max: i64,
+    },
     /// Finite number within `[min, max]`; a whole number in the file is taken as a number.
-    Number { min: f64, max: f64 },
+    Number {
+        min: f64,
+        max: f64,
+    },
     /// One of a list of words, each with a one-line meaning.
     Choice(&'static [(&'static str, &'static str)]),
     /// Words known at run time, such as the energies: the function lists them with their meanings.

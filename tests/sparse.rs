@@ -142,7 +142,10 @@ fn blocks_agree_with_dense_algebra() {
     let (points, cells) = grid(5);
     agrees_with_dense::<3, 4>(&points, &cells, &inside(&points));
     agrees_with_dense::<1, 4>(&points, &cells, &vec![true; points.len()]);
-    let triangles: Vec<[u32; 3]> = cells.iter().map(|c| [c[0], c[1], c[3]]).collect();
+    let triangles: Vec<[u32; 3]> = cells
+        .iter()
+        .flat_map(|c| [[c[0], c[1], c[2]], [c[1], c[2], c[3]]])
+        .collect();
     agrees_with_dense::<2, 3>(&points, &triangles, &vec![true; points.len()]);
     let edges: Vec<[u32; 2]> = cells.iter().flat_map(|c| [[c[2], c[3]], [c[0], c[1]]]).collect();
     agrees_with_dense::<1, 2>(&points, &edges, &vec![true; points.len()]);

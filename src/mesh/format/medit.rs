@@ -21,8 +21,7 @@ const SECTIONS: [(&str, CellKind); 6] = [
 /// Whether the first words are MEDIT's.
 pub(super) fn sniff(bytes: &[u8]) -> bool {
     let mut text = Text::new(bytes, Some(b'#'));
-    text.word()
-        .is_some_and(|word| same(word, "MeshVersionFormatted"))
+    text.word().is_some_and(|word| same(word, "MeshVersionFormatted"))
 }
 
 /// A section of cells: where its first index stands, and how many cells it has.
@@ -48,15 +47,24 @@ pub(super) fn read(bytes: &[u8]) -> Result<Content, Fault> {
         if same(word, "MeshVersionFormatted") {
             let version = text.integer(format_args!("the version of the format (1 to 4)"))?;
             if !(1..=4).contains(&version) {
-                return Err(Fault::text(at, format!("version {version} is unknown; 1 to 4 are known")));
+                return Err(Fault::text(
+                    at,
+                    format!("version {version} is unknown; 1 to 4 are known"),
+                ));
             }
         } else if same(word, "Dimension") {
             dimension = text.integer(format_args!("the dimension (2 or 3)"))?;
             if !(2..=3).contains(&dimension) {
-                return Err(Fault::text(at, format!("dimension {dimension} is unknown; write 2 or 3")));
+                return Err(Fault::text(
+                    at,
+                    format!("dimension {dimension} is unknown; write 2 or 3"),
+                ));
             }
             if points.is_some() {
-                return Err(Fault::text(at, "the dimension comes after the vertices; put it before them"));
+                return Err(Fault::text(
+                    at,
+                    "the dimension comes after the vertices; put it before them",
+                ));
             }
         } else if same(word, "Vertices") {
             if points.is_some() {
@@ -105,7 +113,8 @@ pub(super) fn read(bytes: &[u8]) -> Result<Content, Fault> {
         }
     }
 
-    let points = points.ok_or_else(|| Fault::whole("there is no section \"Vertices\"; the file is cut off or no MEDIT file"))?;
+    let points =
+        points.ok_or_else(|| Fault::whole("there is no section \"Vertices\"; the file is cut off or no MEDIT file"))?;
     if sorter.names_beyond(points.len()) {
         for section in &sections {
             check_indices(bytes, section, points.len())?;
@@ -165,7 +174,11 @@ pub(super) fn write(content: &Content) -> Written {
     let cell_labels = reference_labels(&content.cell_data);
     let label = |labels: Option<&[f64]>, row: usize| labels.map_or(0, |labels| labels[row] as i64);
     // Writing to memory cannot fail.
-    let _ = write!(out, "MeshVersionFormatted 2\nDimension 3\nVertices\n{}\n", content.points.len());
+    let _ = write!(
+        out,
+        "MeshVersionFormatted 2\nDimension 3\nVertices\n{}\n",
+        content.points.len()
+    );
     for (row, [x, y, z]) in content.points.iter().enumerate() {
         let _ = writeln!(out, "{x:?} {y:?} {z:?} {}", label(point_labels, row));
     }
@@ -186,7 +199,11 @@ pub(super) fn write(content: &Content) -> Written {
     }
     out.extend_from_slice(b"End\n");
     let keeps = |field: &super::Field, of_points: bool| {
-        let fields = if of_points { &content.point_data } else { &content.cell_data };
+        let fields = if of_points {
+            &content.point_data
+        } else {
+            &content.cell_data
+        };
         field.name == super::REFERENCE && reference_labels(fields).is_some()
     };
     Written {

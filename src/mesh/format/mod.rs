@@ -355,5 +355,8 @@ fn left_out(format: &str, content: &Content, keeps: impl Fn(&Field, bool) -> boo
     if names.is_empty() {
         return Vec::new();
     }
-    vec![format!("{format} cannot hold these fields, left out: {}", names.join(", "))]
+    vec![format!(
+        "{format} cannot hold these fields, left out: {}",
+        names.join(", ")
+    )]
 }

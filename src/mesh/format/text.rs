@@ -160,7 +160,10 @@ impl<'a> Text<'a> {
 
     /// The error that the word just passed is not `what`.
     pub(super) fn not(&self, word: &[u8], what: Arguments<'_>) -> Fault {
-        Fault::text(self.at - word.len(), format!("{} stands where {what} is expected", shown(word)))
+        Fault::text(
+            self.at - word.len(),
+            format!("{} stands where {what} is expected", shown(word)),
+        )
     }
 
     /// The error that the text ends where `what` is expected.

@@ -31,14 +31,22 @@ pub(super) fn add_cell(sorter: &mut Sorter, code: i64, corners: &[u32]) -> Resul
         11 | 12 => CellKind::Hexahedron,
         13 => CellKind::Prism,
         14 => CellKind::Pyramid,
-        42 => return Err("polyhedra are not read; split them into tetrahedra (VTK: vtkDataSetTriangleFilter)".to_string()),
+        42 => {
+            return Err(
+                "polyhedra are not read; split them into tetrahedra (VTK: vtkDataSetTriangleFilter)".to_string(),
+            );
+        }
         21..=37 | 60..=81 => {
             return Err(format!(
                 "cells of type {code} ({}) are of higher order; only straight cells are read, write the mesh with order 1",
                 higher_order(code)
             ));
         }
-        _ => return Err(format!("cell type {code} is unknown; types 1 to 5 and 7 to 14 are read")),
+        _ => {
+            return Err(format!(
+                "cell type {code} is unknown; types 1 to 5 and 7 to 14 are read"
+            ));
+        }
     };
     if corners.len() != kind.corners() {
         return Err(format!(

@@ -12,8 +12,8 @@ use super::{Cells, Content, Fault, Field, Written, vtk};
 use base64::Engine as _;
 use base64::alphabet::STANDARD;
 use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
-use quick_xml::Reader;
 use quick_xml::events::{BytesStart, Event};
+use quick_xml::{Reader, XmlVersion};
 use std::fmt::Write as _;
 use std::io::{Read as _, Write as _};
 
@@ -118,7 +118,12 @@ fn read_points(file: &File<'_>) -> Result<Vec<[f64; 3]>, Fault> {
     if let Some(bad) = values.iter().position(|value| !value.is_finite()) {
         return Err(Fault::text(
             array.at,
-            format!("coordinate {} of point {} (from 0) is {}, not a finite number", bad % 3, bad / 3, values[bad]),
+            format!(
+                "coordinate {} of point {} (from 0) is {}, not a finite number",
+                bad % 3,
+                bad / 3,
+                values[bad]
+            ),
         ));
     }
     Ok(values.as_chunks().0.to_vec())
@@ -187,9 +192,9 @@ impl<'a> File<'a> {
         let mut inner = 0_usize;
         loop {
             let at = reader.buffer_position() as usize;
-            let event = reader
-                .read_event()
-                .map_err(|error| Fault::text(reader.error_position() as usize, format!("the XML is damaged: {error}")))?;
+            let event = reader.read_event().map_err(|error| {
+                Fault::text(reader.error_position() as usize, format!("the XML is damaged: {error}"))
+            })?;
             let empty = matches!(event, Event::Empty(_));
             match event {
                 Event::Start(tag) | Event::Empty(tag) => match tag.name().as_ref() {
@@ -215,7 +220,8 @@ impl<'a> File<'a> {
                     b"CellData" => part = Some(Part::CellData),
                     b"FieldData" => {
                         part = None;
-                        file.notices.push("data of the whole file (FieldData) left out".to_string());
+                        file.notices
+                            .push("data of the whole file (FieldData) left out".to_string());
                     }
                     b"DataArray" | b"Array" => {
                         if let Some(part) = part {
@@ -229,12 +235,17 @@ impl<'a> File<'a> {
                             Some("raw") => true,
                             Some("base64") | None => false,
                             Some(other) => {
-                                return Err(Fault::text(at, format!("the encoding {other:?} is unknown; raw and base64 are read")));
+                                return Err(Fault::text(
+                                    at,
+                                    format!("the encoding {other:?} is unknown; raw and base64 are read"),
+                                ));
                             }
                         };
                         let from = reader.buffer_position() as usize;
                         let mark = bytes[from..].iter().position(|&byte| byte == b'_');
-                        let mark = mark.ok_or_else(|| Fault::text(at, "the appended data do not start with '_'; the file is cut off"))?;
+                        let mark = mark.ok_or_else(|| {
+                            Fault::text(at, "the appended data do not start with '_'; the file is cut off")
+                        })?;
                         file.appended = Some((from + mark + 1, raw));
                         // What follows need not be XML.
                         break;
@@ -261,10 +272,14 @@ impl<'a> File<'a> {
             }
         }
         if !seen_file {
-            return Err(Fault::whole("this is XML, but not a VTK file: there is no element VTKFile"));
+            return Err(Fault::whole(
+                "this is XML, but not a VTK file: there is no element VTKFile",
+            ));
         }
         if pieces == 0 {
-            return Err(Fault::whole("there is no element Piece with points and cells; the file is cut off"));
+            return Err(Fault::whole(
+                "there is no element Piece with points and cells; the file is cut off",
+            ));
         }
         Ok(file)
     }
@@ -285,12 +300,22 @@ impl<'a> File<'a> {
         self.order = match attribute(tag, at, "byte_order")?.as_deref() {
             Some("BigEndian") => Order::Big,
             Some("LittleEndian") | None => Order::Little,
-            Some(other) => return Err(Fault::text(at, format!("the byte order {other:?} is unknown; write LittleEndian or BigEndian"))),
+            Some(other) => {
+                return Err(Fault::text(
+                    at,
+                    format!("the byte order {other:?} is unknown; write LittleEndian or BigEndian"),
+                ));
+            }
         };
         self.header = match attribute(tag, at, "header_type")?.as_deref() {
             Some("UInt64") => Scalar::UInt64,
             Some("UInt32") | None => Scalar::UInt32,
-            Some(other) => return Err(Fault::text(at, format!("the header type {other:?} is unknown; write UInt32 or UInt64"))),
+            Some(other) => {
+                return Err(Fault::text(
+                    at,
+                    format!("the header type {other:?} is unknown; write UInt32 or UInt64"),
+                ));
+            }
         };
         self.compressed = match attribute(tag, at, "compressor")?.as_deref() {
             None | Some("") => false,
@@ -298,7 +323,9 @@ impl<'a> File<'a> {
             Some(other) => {
                 return Err(Fault::text(
                     at,
-                    format!("the compressor {other} is not known; write the file with vtkZLibDataCompressor or without one"),
+                    format!(
+                        "the compressor {other} is not known; write the file with vtkZLibDataCompressor or without one"
+                    ),
                 ));
             }
         };
@@ -322,7 +349,12 @@ impl<'a> File<'a> {
                 self.notices.push(format!("the field {name:?} of strings left out"));
                 return Ok(());
             }
-            Some(other) => return Err(Fault::text(at, format!("the number type {other:?} of array {name:?} is unknown"))),
+            Some(other) => {
+                return Err(Fault::text(
+                    at,
+                    format!("the number type {other:?} of array {name:?} is unknown"),
+                ));
+            }
             None => return Err(Fault::text(at, format!("the array {name:?} has no attribute type"))),
         };
         let components = match attribute(tag, at, "NumberOfComponents")?.as_deref() {
@@ -393,7 +425,10 @@ impl<'a> File<'a> {
         } else {
             let bytes = self.decode(array, count)?;
             binary::integers(array.scalar, self.order, &bytes).ok_or_else(|| {
-                Fault::text(array.at, format!("the array {:?} holds real numbers; integers are expected", array.name))
+                Fault::text(
+                    array.at,
+                    format!("the array {:?} holds real numbers; integers are expected", array.name),
+                )
             })
         }
     }
@@ -402,7 +437,10 @@ impl<'a> File<'a> {
         rows.checked_mul(array.components).ok_or_else(|| {
             Fault::text(
                 array.at,
-                format!("the array {:?} would hold {rows} x {} numbers; correct the count", array.name, array.components),
+                format!(
+                    "the array {:?} would hold {rows} x {} numbers; correct the count",
+                    array.name, array.components
+                ),
             )
         })
     }
@@ -432,7 +470,10 @@ impl<'a> File<'a> {
             None => Ok(values),
             Some(_) => Err(Fault::text(
                 text.at(),
-                format!("the array {:?} holds more than the {count} numbers that are expected", array.name),
+                format!(
+                    "the array {:?} holds more than the {count} numbers that are expected",
+                    array.name
+                ),
             )),
         }
     }
@@ -445,21 +486,32 @@ impl<'a> File<'a> {
             .ok_or_else(|| fault(format!("would hold {count} numbers; correct the count")))?;
         let decoded;
         let data: &[u8] = match (array.form, self.appended) {
-            (Form::Appended(_), None) => return Err(fault("refers to appended data, but there are none; the file is cut off".to_string())),
+            (Form::Appended(_), None) => {
+                return Err(fault(
+                    "refers to appended data, but there are none; the file is cut off".to_string(),
+                ));
+            }
             (Form::Appended(offset), Some((start, raw))) => {
                 let all = &self.bytes[start..];
-                let own = all
-                    .get(offset..)
-                    .ok_or_else(|| fault(format!("starts at {offset}, beyond the {} appended bytes; the file is cut off", all.len())))?;
+                let own = all.get(offset..).ok_or_else(|| {
+                    fault(format!(
+                        "starts at {offset}, beyond the {} appended bytes; the file is cut off",
+                        all.len()
+                    ))
+                })?;
                 if raw {
                     own
                 } else {
-                    decoded = self.decode_base64(own, self.next_offset(offset).map(|next| next - offset)).map_err(fault)?;
+                    decoded = self
+                        .decode_base64(own, self.next_offset(offset).map(|next| next - offset))
+                        .map_err(fault)?;
                     &decoded
                 }
             }
             (Form::Inline | Form::Ascii, _) => {
-                decoded = self.decode_base64(&self.bytes[array.start..array.end], None).map_err(fault)?;
+                decoded = self
+                    .decode_base64(&self.bytes[array.start..array.end], None)
+                    .map_err(fault)?;
                 &decoded
             }
         };
@@ -506,7 +558,9 @@ impl<'a> File<'a> {
         let mut values = Vec::with_capacity(wanted);
         let mut start = (3 + blocks) * self.header.size();
         for index in 0..blocks {
-            let end = number(3 + index).and_then(|size| start.checked_add(size)).ok_or_else(cut)?;
+            let end = number(3 + index)
+                .and_then(|size| start.checked_add(size))
+                .ok_or_else(cut)?;
             let packed = data.get(start..end).ok_or_else(cut)?;
             let size = if index < whole_blocks { block } else { last };
             let before = values.len();
@@ -557,7 +611,9 @@ fn attribute(tag: &BytesStart<'_>, at: usize, name: &str) -> Result<Option<Strin
     match found {
         None => Ok(None),
         Some(found) => {
-            let value = found.unescape_value().map_err(|error| damaged(&error))?;
+            let value = found
+                .normalized_value(XmlVersion::Implicit1_0)
+                .map_err(|error| damaged(&error))?;
             Ok(Some(value.into_owned()))
         }
     }
@@ -577,7 +633,12 @@ pub type FieldView<'a> = (&'a str, usize, &'a [f64]);
 ///
 /// # Panics
 /// When a field does not have a row for every point or cell.
-pub fn write(points: &[[f64; 3]], cells: Cells<'_>, point_data: &[FieldView<'_>], cell_data: &[FieldView<'_>]) -> Vec<u8> {
+pub fn write(
+    points: &[[f64; 3]],
+    cells: Cells<'_>,
+    point_data: &[FieldView<'_>],
+    cell_data: &[FieldView<'_>],
+) -> Vec<u8> {
     let mut out = String::new();
     // Writing to a string cannot fail.
     let _ = write!(
@@ -589,11 +650,24 @@ pub fn write(points: &[[f64; 3]], cells: Cells<'_>, point_data: &[FieldView<'_>]
         points.len(),
         cells.count()
     );
-    for (part, rows, fields) in [("PointData", points.len(), point_data), ("CellData", cells.count(), cell_data)] {
+    for (part, rows, fields) in [
+        ("PointData", points.len(), point_data),
+        ("CellData", cells.count(), cell_data),
+    ] {
         let _ = writeln!(out, "<{part}>");
         for &(name, components, values) in fields {
-            assert_eq!(values.len(), rows * components, "field {name:?} has a row for each point or cell");
-            write_array(&mut out, name, "Float64", components, values.iter().flat_map(|value| value.to_le_bytes()));
+            assert_eq!(
+                values.len(),
+                rows * components,
+                "field {name:?} has a row for each point or cell"
+            );
+            write_array(
+                &mut out,
+                name,
+                "Float64",
+                components,
+                values.iter().flat_map(|value| value.to_le_bytes()),
+            );
         }
         let _ = writeln!(out, "</{part}>");
     }
@@ -602,20 +676,36 @@ pub fn write(points: &[[f64; 3]], cells: Cells<'_>, point_data: &[FieldView<'_>]
     write_array(&mut out, "Points", "Float64", 3, coordinates);
     out.push_str("</Points>\n<Cells>\n");
     let corners = cells.iter().flat_map(|(_, corners)| corners);
-    write_array(&mut out, "connectivity", "Int64", 1, corners.flat_map(|&corner| i64::from(corner).to_le_bytes()));
+    write_array(
+        &mut out,
+        "connectivity",
+        "Int64",
+        1,
+        corners.flat_map(|&corner| i64::from(corner).to_le_bytes()),
+    );
     let offsets = cells.iter().scan(0_i64, |end, (_, corners)| {
         *end += corners.len() as i64;
         Some(*end)
     });
     write_array(&mut out, "offsets", "Int64", 1, offsets.flat_map(i64::to_le_bytes));
-    write_array(&mut out, "types", "UInt8", 1, cells.iter().map(|(kind, _)| vtk::code(kind)));
+    write_array(
+        &mut out,
+        "types",
+        "UInt8",
+        1,
+        cells.iter().map(|(kind, _)| vtk::code(kind)),
+    );
     out.push_str("</Cells>\n</Piece>\n</UnstructuredGrid>\n</VTKFile>\n");
     out.into_bytes()
 }
 
 fn write_array(out: &mut String, name: &str, kind: &str, components: usize, bytes: impl Iterator<Item = u8>) {
     let bytes: Vec<u8> = bytes.collect();
-    let mut header = vec![bytes.len().div_ceil(BLOCK) as u64, BLOCK as u64, (bytes.len() % BLOCK) as u64];
+    let mut header = vec![
+        bytes.len().div_ceil(BLOCK) as u64,
+        BLOCK as u64,
+        (bytes.len() % BLOCK) as u64,
+    ];
     let mut packed = Vec::with_capacity(bytes.len() / 2);
     for block in bytes.chunks(BLOCK) {
         let before = packed.len();
@@ -638,7 +728,12 @@ fn write_array(out: &mut String, name: &str, kind: &str, components: usize, byte
 /// Writes the whole of `content`.
 pub(super) fn write_content(content: &Content) -> Written {
     Written {
-        bytes: write(&content.points, content.cells(), &views(&content.point_data), &views(&content.cell_data)),
+        bytes: write(
+            &content.points,
+            content.cells(),
+            &views(&content.point_data),
+            &views(&content.cell_data),
+        ),
         notices: Vec::new(),
     }
 }

@@ -8,6 +8,7 @@ pub mod split;
 pub mod check;
 pub mod generate;
 pub mod target;
+pub mod format;
 
 /// A mesh of cells with `N` vertices each: `points` in model units, `cells` as indices into `points`.
 #[derive(Clone, Debug, Default, PartialEq)]

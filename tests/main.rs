@@ -1,3 +1,6 @@
 //! One test binary; a file a property.
 
 mod floors;
+mod energies;
+mod kernels;
+mod mapping;

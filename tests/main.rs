@@ -4,3 +4,4 @@ mod floors;
 mod energies;
 mod kernels;
 mod mapping;
+mod sparse;

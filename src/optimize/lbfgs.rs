@@ -6,7 +6,8 @@ use super::line_search::{Start, StrongWolfe};
 use super::{Counters, Iterate, Objective, Observer, Solution, StopReason, Stopping, dot, norm};
 use std::collections::VecDeque;
 
-pub(super) const SUMMARY: &str = "L-BFGS: quasi-Newton with limited memory and strong Wolfe steps (Liu and Nocedal 1989)";
+pub(super) const SUMMARY: &str =
+    "L-BFGS: quasi-Newton with limited memory and strong Wolfe steps (Liu and Nocedal 1989)";
 
 /// Options of L-BFGS.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -20,7 +21,11 @@ pub struct Lbfgs {
 impl Default for Lbfgs {
     fn default() -> Self {
         Self {
-            stopping: Stopping { relative_decrement: 0.0, iterations: 10_000, ..Stopping::default() },
+            stopping: Stopping {
+                relative_decrement: 0.0,
+                iterations: 10_000,
+                ..Stopping::default()
+            },
             line_search: StrongWolfe::default(),
             memory: 10,
         }
@@ -42,9 +47,16 @@ impl Lbfgs {
         x: Vec<f64>,
         observer: &mut dyn Observer,
     ) -> Solution {
-        assert_eq!(x.len(), objective.dimension(), "a start with as many numbers as there are unknowns");
+        assert_eq!(
+            x.len(),
+            objective.dimension(),
+            "a start with as many numbers as there are unknowns"
+        );
         let size = x.len();
-        let mut counters = Counters { evaluations: 1, ..Counters::default() };
+        let mut counters = Counters {
+            evaluations: 1,
+            ..Counters::default()
+        };
         let mut x = x;
         let mut point = vec![0.0; size];
         let mut gradient = vec![0.0; size];
@@ -59,10 +71,18 @@ impl Lbfgs {
         let (stop, reason) = loop {
             let gradient_norm = norm(&gradient);
             if !value.is_finite() || !gradient_norm.is_finite() {
-                break (StopReason::NotFinite, "the energy or its gradient is not a finite number".to_string());
+                break (
+                    StopReason::NotFinite,
+                    "the energy or its gradient is not a finite number".to_string(),
+                );
             }
             if !std::mem::replace(&mut told, true) {
-                observer.iterate(&Iterate { iteration: counters.iterations, energy: value, gradient_norm, step });
+                observer.iterate(&Iterate {
+                    iteration: counters.iterations,
+                    energy: value,
+                    gradient_norm,
+                    step,
+                });
             }
             if let Some(reason) = self.stopping.gradient(gradient_norm) {
                 break (StopReason::Converged, reason);
@@ -81,11 +101,23 @@ impl Lbfgs {
                 break (reason, "stopped from outside".into());
             }
             if counters.iterations >= self.stopping.iterations {
-                break (StopReason::StepLimit, format!("{} iterations were not enough", self.stopping.iterations));
+                break (
+                    StopReason::StepLimit,
+                    format!("{} iterations were not enough", self.stopping.iterations),
+                );
             }
             // Without memory the direction has no natural length: start with a unit step in space.
-            let length = if pairs.is_empty() { (1.0 / gradient_norm).min(1.0) } else { 1.0 };
-            let start = Start { x: &x, value, gradient: &gradient, direction: &direction };
+            let length = if pairs.is_empty() {
+                (1.0 / gradient_norm).min(1.0)
+            } else {
+                1.0
+            };
+            let start = Start {
+                x: &x,
+                value,
+                gradient: &gradient,
+                direction: &direction,
+            };
             let accepted = self.line_search.search(
                 objective,
                 start,
@@ -102,7 +134,12 @@ impl Lbfgs {
                 pairs.clear();
                 continue;
             };
-            let mut pair = if pairs.len() == self.memory { pairs.pop_front() } else { None }.unwrap_or_else(|| Pair {
+            let mut pair = if pairs.len() == self.memory {
+                pairs.pop_front()
+            } else {
+                None
+            }
+            .unwrap_or_else(|| Pair {
                 point: vec![0.0; size],
                 gradient: vec![0.0; size],
                 inverse: 0.0,
@@ -126,7 +163,14 @@ impl Lbfgs {
             told = false;
         };
         let gradient_norm = norm(&gradient);
-        Solution { x, value, gradient_norm, stop, reason, counters }
+        Solution {
+            x,
+            value,
+            gradient_norm,
+            stop,
+            reason,
+            counters,
+        }
     }
 }
 

@@ -42,7 +42,12 @@ pub struct Backtracking {
 
 impl Default for Backtracking {
     fn default() -> Self {
-        Self { decrease: 1e-4, shrink: 0.5, trials: 60, gradient_decrease: false }
+        Self {
+            decrease: 1e-4,
+            shrink: 0.5,
+            trials: 60,
+            gradient_decrease: false,
+        }
     }
 }
 
@@ -75,12 +80,20 @@ impl Backtracking {
                     return None;
                 }
                 if !self.gradient_decrease {
-                    return Some(Step { length, value, has_gradient: false });
+                    return Some(Step {
+                        length,
+                        value,
+                        has_gradient: false,
+                    });
                 }
                 *evaluations += 1;
                 let value = objective.gradient(point, gradient);
                 if value.is_finite() && norm(gradient) <= before {
-                    return Some(Step { length, value, has_gradient: true });
+                    return Some(Step {
+                        length,
+                        value,
+                        has_gradient: true,
+                    });
                 }
             }
             length *= self.shrink;
@@ -102,7 +115,11 @@ pub struct StrongWolfe {
 
 impl Default for StrongWolfe {
     fn default() -> Self {
-        Self { decrease: 1e-4, curvature: 0.9, trials: 40 }
+        Self {
+            decrease: 1e-4,
+            curvature: 0.9,
+            trials: 40,
+        }
     }
 }
 
@@ -135,7 +152,11 @@ impl StrongWolfe {
         let limit = SAFETY * objective.max_step(start.x, start.direction);
         let mut trials = self.trials;
         let mut best: Option<Trial> = None;
-        let mut low = Trial { length: 0.0, value: start.value, slope };
+        let mut low = Trial {
+            length: 0.0,
+            value: start.value,
+            slope,
+        };
         let mut high: Option<Trial> = None;
         let mut next = length.min(limit);
         while trials > 0 {
@@ -143,17 +164,28 @@ impl StrongWolfe {
             advance(&start, next, point);
             *evaluations += 1;
             let value = objective.gradient(point, gradient);
-            let trial = Trial { length: next, value, slope: dot(gradient, start.direction) };
+            let trial = Trial {
+                length: next,
+                value,
+                slope: dot(gradient, start.direction),
+            };
             let finite = value.is_finite() && trial.slope.is_finite();
             let decreases = finite && value <= start.value + self.decrease * next * slope;
             if decreases && trial.slope.abs() <= -self.curvature * slope {
-                return (point != start.x).then_some(Step { length: next, value, has_gradient: true });
+                return (point != start.x).then_some(Step {
+                    length: next,
+                    value,
+                    has_gradient: true,
+                });
             }
             if decreases && best.is_none_or(|best| value < best.value) {
                 best = Some(trial);
             }
             if !decreases || value >= low.value {
-                high = Some(Trial { value: if finite { value } else { f64::INFINITY }, ..trial });
+                high = Some(Trial {
+                    value: if finite { value } else { f64::INFINITY },
+                    ..trial
+                });
             } else {
                 let rises = match high {
                     Some(high) => trial.slope * (high.length - low.length) >= 0.0,
@@ -181,7 +213,11 @@ impl StrongWolfe {
         advance(&start, best.length, point);
         *evaluations += 1;
         let value = objective.gradient(point, gradient);
-        (value.is_finite() && point != start.x).then_some(Step { length: best.length, value, has_gradient: true })
+        (value.is_finite() && point != start.x).then_some(Step {
+            length: best.length,
+            value,
+            has_gradient: true,
+        })
     }
 }
 
@@ -190,7 +226,11 @@ impl StrongWolfe {
 fn between(low: Trial, high: Trial) -> f64 {
     let width = high.length - low.length;
     let bend = high.value - low.value - low.slope * width;
-    let share = if bend.is_finite() && bend > 0.0 { -low.slope * width / (2.0 * bend) } else { 0.5 };
+    let share = if bend.is_finite() && bend > 0.0 {
+        -low.slope * width / (2.0 * bend)
+    } else {
+        0.5
+    };
     low.length + width * share.clamp(0.1, 0.9)
 }
 

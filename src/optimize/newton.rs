@@ -23,7 +23,11 @@ impl Newton {
         x: Vec<f64>,
         observer: &mut dyn Observer,
     ) -> Solution {
-        assert_eq!(x.len(), objective.dimension(), "a start with as many numbers as there are unknowns");
+        assert_eq!(
+            x.len(),
+            objective.dimension(),
+            "a start with as many numbers as there are unknowns"
+        );
         let factorizations = objective.factorizations();
         let mut counters = Counters::default();
         let mut x = x;
@@ -57,7 +61,12 @@ impl Newton {
                 }
                 Ok(energy) => value = energy,
             }
-            observer.iterate(&Iterate { iteration: counters.iterations, energy: value, gradient_norm, step });
+            observer.iterate(&Iterate {
+                iteration: counters.iterations,
+                energy: value,
+                gradient_norm,
+                step,
+            });
             if let Some(reason) = self.stopping.gradient(gradient_norm) {
                 break (StopReason::Converged, reason);
             }
@@ -77,20 +86,43 @@ impl Newton {
                 break (reason, "stopped from outside".into());
             }
             if counters.iterations >= self.stopping.iterations {
-                break (StopReason::StepLimit, format!("{} iterations were not enough", self.stopping.iterations));
+                break (
+                    StopReason::StepLimit,
+                    format!("{} iterations were not enough", self.stopping.iterations),
+                );
             }
-            let start = Start { x: &x, value, gradient: &gradient, direction: &direction };
-            match self.line_search.search(objective, start, &mut point, &mut spare, &mut counters.evaluations) {
+            let start = Start {
+                x: &x,
+                value,
+                gradient: &gradient,
+                direction: &direction,
+            };
+            match self
+                .line_search
+                .search(objective, start, &mut point, &mut spare, &mut counters.evaluations)
+            {
                 Some(accepted) => {
                     before = Some(value);
                     std::mem::swap(&mut x, &mut point);
                     step = accepted.length;
                     counters.iterations += 1;
                 }
-                None => break (StopReason::Stalled, "no step along the Newton direction is acceptable".into()),
+                None => {
+                    break (
+                        StopReason::Stalled,
+                        "no step along the Newton direction is acceptable".into(),
+                    );
+                }
             }
         };
         counters.factorizations = objective.factorizations() - factorizations;
-        Solution { x, value, gradient_norm, stop, reason, counters }
+        Solution {
+            x,
+            value,
+            gradient_norm,
+            stop,
+            reason,
+            counters,
+        }
     }
 }

@@ -4,7 +4,10 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
-    let mut entries: Vec<_> = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
+    let mut entries: Vec<_> = fs::read_dir(folder)
+        .unwrap()
+        .map(|entry| entry.unwrap().path())
+        .collect();
     entries.sort();
     for path in entries {
         if path.is_dir() {
@@ -30,7 +33,10 @@ fn named(text: &str) -> Vec<(usize, String)> {
         let line = text[..at].matches('\n').count() + 1;
         let rest = &text[at + "crate::".len()..];
         let word = |part: &str| -> String {
-            part.trim_start().chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect()
+            part.trim_start()
+                .chars()
+                .take_while(|c| c.is_alphanumeric() || *c == '_')
+                .collect()
         };
         if let Some(group) = rest.strip_prefix('{') {
             let mut depth = 0;
@@ -76,7 +82,15 @@ fn no_file_names_a_module_above_its_own() {
     let mut broken = Vec::new();
     for path in &files {
         let inside = path.strip_prefix(&source).unwrap();
-        let own = inside.components().next().unwrap().as_os_str().to_str().unwrap().trim_end_matches(".rs").to_owned();
+        let own = inside
+            .components()
+            .next()
+            .unwrap()
+            .as_os_str()
+            .to_str()
+            .unwrap()
+            .trim_end_matches(".rs")
+            .to_owned();
         let Some(own_height) = height(&own) else {
             continue;
         };
@@ -84,7 +98,9 @@ fn no_file_names_a_module_above_its_own() {
         for (line, name) in named(&text) {
             let strangers = own == "report" && name == "run";
             match height(&name) {
-                Some(other) if other > own_height => broken.push(format!("{}:{line}: {own} names {name}", inside.display())),
+                Some(other) if other > own_height => {
+                    broken.push(format!("{}:{line}: {own} names {name}", inside.display()))
+                }
                 _ if strangers => broken.push(format!("{}:{line}: {own} names {name}", inside.display())),
                 _ => {}
             }
@@ -106,7 +122,16 @@ fn nothing_up_to_the_methods_opens_a_file_reads_a_clock_or_prints() {
             let text = fs::read_to_string(&path).unwrap();
             for (number, line) in text.lines().enumerate() {
                 let code = line.split("//").next().unwrap();
-                for word in ["std::fs", "File::open", "std::time", "Instant::now", "SystemTime", "println!", "eprintln!", "dbg!"] {
+                for word in [
+                    "std::fs",
+                    "File::open",
+                    "std::time",
+                    "Instant::now",
+                    "SystemTime",
+                    "println!",
+                    "eprintln!",
+                    "dbg!",
+                ] {
                     if code.contains(word) {
                         broken.push(format!("{}:{}: {word}", path.display(), number + 1));
                     }

@@ -1,8 +1,12 @@
 //! An experiment as its file states it: every name checked, every default filled, nothing run.
 
+use super::diagnostic::{Diagnostic, Source};
 use crate::method::Method;
 use serde_json::Value;
 use std::collections::BTreeMap;
+use std::ops::Range;
+use std::path::PathBuf;
+use std::sync::Arc;
 
 /// A named model of the file.
 #[derive(Clone, Debug, PartialEq)]
@@ -48,17 +52,17 @@ pub struct Timing {
 /// A condition on the axes: `{ energy = "stretch", model = ["ball", "duck"] }`; a list means any of.
 pub type Condition = BTreeMap<String, Vec<Value>>;
 
-/// `[[table]]`
+/// `[[table]]`. Columns are names of [`super::column::columns`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Table {
     pub name: String,
     pub title: Option<String>,
     /// Axes whose values head each row.
     pub rows: Vec<String>,
-    /// Metrics.
+    /// Metrics, counters and measurements.
     pub columns: Vec<String>,
     pub condition: Condition,
-    /// Printed figures: rows of axis values and metric values; `tolerance` is relative.
+    /// Printed figures: rows of axis values and metric values.
     pub published: Option<Published>,
 }
 
@@ -117,7 +121,7 @@ pub struct Expectation {
     /// The stop reason that must be met, such as `converged` or `infeasible`.
     pub stop: Option<String>,
     pub bounds: BTreeMap<String, Bound>,
-    /// `{ d_ma = { below = { energy = "dirichlet" } } }`: our metric below that of the job that differs only in these axes.
+    /// `d_ma = { less_than = { energy = "dirichlet" } }`: our metric below that of the job that differs only in these axes.
     pub comparisons: Vec<Comparison>,
     /// 1-based line in the file, for messages.
     pub line: usize,
@@ -128,8 +132,20 @@ pub struct Expectation {
 pub struct Comparison {
     pub metric: String,
     pub other: Condition,
-    /// Ours must be at most `factor` times the other's.
+    /// Ours must be less than `factor` times the other's.
     pub factor: f64,
+}
+
+/// Where an experiment was read from, so that what a plan finds can be underlined in the file.
+#[derive(Clone, Debug, Default)]
+pub struct Origin {
+    pub source: Arc<Source>,
+    /// Folder of the file: relative paths in it begin here.
+    pub folder: PathBuf,
+    /// Bytes of each entry, by dotted path such as `vary.energy` or `models.duck.mesh`.
+    pub places: BTreeMap<String, Range<usize>>,
+    /// What is doubtful but no error.
+    pub warnings: Vec<Diagnostic>,
 }
 
 /// A checked experiment file.
@@ -143,7 +159,8 @@ pub struct Experiment {
     pub models: Vec<Model>,
     /// Complete settings held for every job.
     pub settings: Value,
-    /// Axes in the order of the file; the last varies fastest.
+    /// Axes in the order of the file; the last varies fastest. `model` is always among the axes of a method that has
+    /// models: first, and with all of them, where the file does not list it.
     pub axes: Vec<Axis>,
     /// Groups of axes that move together; each group counts as one axis after those of `vary`.
     pub zips: Vec<Vec<Axis>>,
@@ -154,4 +171,5 @@ pub struct Experiment {
     pub plots: Vec<Plot>,
     pub rates: Vec<Rate>,
     pub expectations: Vec<Expectation>,
+    pub origin: Origin,
 }

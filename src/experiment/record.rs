@@ -1,6 +1,7 @@
 //! What a job leaves: a deterministic result, and measurements of how it was obtained.
 
 use super::job::{Job, Key};
+use crate::metric::{Better, Metric};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -79,6 +80,84 @@ pub struct Measurement {
     pub peak_memory: u64,
     /// Input file names as given, by role: for the reader, not part of the key.
     pub inputs: BTreeMap<String, String>,
+}
+
+/// Measurements that tables, plots and expectations may name beside a method's metrics.
+pub const MEASUREMENTS: &[Metric] = &[
+    Metric {
+        name: "seconds",
+        symbol: "time",
+        unit: "s",
+        floor: Some(0.0),
+        better: Better::Lower,
+        definition: "wall-clock time of the method, median over the repetitions",
+    },
+    Metric {
+        name: "cpu_seconds",
+        symbol: "CPU time",
+        unit: "s",
+        floor: Some(0.0),
+        better: Better::Lower,
+        definition: "processor time of the method over all threads, median over the repetitions",
+    },
+    Metric {
+        name: "peak_memory",
+        symbol: "memory",
+        unit: "B",
+        floor: Some(0.0),
+        better: Better::Lower,
+        definition: "peak resident memory of the job's process",
+    },
+];
+
+/// Words that a record's `stop` may hold beside those of a method, with their meanings.
+pub const STOPS: &[(&str, &str)] = &[
+    ("converged", "a convergence criterion was met"),
+    ("stalled", "no acceptable step was found although no criterion was met"),
+    ("step-limit", "the permitted number of iterations was used up"),
+    ("not-finite", "the energy or its gradient is not a finite number"),
+    (
+        "infeasible",
+        "the problem has no admissible solution, with the obstacles named",
+    ),
+    ("invalid-input", "a model or a setting cannot be used"),
+    ("time-limit", "the time of `limits` was used up"),
+    ("memory-limit", "the memory of `limits` was used up"),
+    ("cancelled", "the user asked to stop"),
+    ("crashed", "the job's process ended by a signal"),
+    ("panicked", "the job ran into a defect of the program"),
+    ("missing-model", "an optional model's file is absent"),
+];
+
+impl Record {
+    /// The number that a column of this name shows: a metric, a counter or a measurement. None where there is none,
+    /// such as the metrics of a job that failed.
+    pub fn number(&self, column: &str) -> Option<f64> {
+        if let Some(value) = self.result.metrics.get(column) {
+            return Some(*value);
+        }
+        if let Some(count) = self.result.counters.get(column) {
+            return Some(*count as f64);
+        }
+        match column {
+            "seconds" => median(&self.measurement.wall_seconds),
+            "cpu_seconds" => median(&self.measurement.cpu_seconds),
+            "peak_memory" => Some(self.measurement.peak_memory as f64).filter(|&bytes| bytes > 0.0),
+            _ => None,
+        }
+    }
+}
+
+/// The middle value, or the mean of the two middle ones; none of an empty list.
+fn median(values: &[f64]) -> Option<f64> {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let middle = sorted.len() / 2;
+    match sorted.len() {
+        0 => None,
+        odd if odd % 2 == 1 => Some(sorted[middle]),
+        _ => Some(0.5 * (sorted[middle - 1] + sorted[middle])),
+    }
 }
 
 mod word {

@@ -72,7 +72,8 @@ pub struct Published {
     /// Where they were printed: `Table 1 of the paper`, and the machine for times.
     pub source: String,
     pub machine: Option<String>,
-    /// Each row holds axis values by axis name and printed numbers by metric name.
+    /// Each row holds axis values by axis name and printed numbers, as whole or not as they are written, by the names of
+    /// the table's columns; `tolerance`, if there, is relative and stands for this row.
     pub rows: Vec<BTreeMap<String, Value>>,
 }
 
@@ -81,7 +82,7 @@ pub struct Published {
 pub struct Plot {
     pub name: String,
     pub title: Option<String>,
-    /// A trace column such as `iteration`, a metric, or a numeric axis.
+    /// A trace such as `iteration`, a column, or an axis, whose values may be words.
     pub x: String,
     pub y: String,
     /// Axes whose values tell the series apart.
@@ -127,7 +128,7 @@ pub struct Expectation {
     pub line: usize,
 }
 
-/// A metric of one job against the same metric of another that differs in the given axes.
+/// A metric of one job against the same metric of the others that have the given axis values and agree in all other axes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Comparison {
     pub metric: String,

@@ -103,10 +103,18 @@ pub const MEASUREMENTS: &[Metric] = &[
     Metric {
         name: "peak_memory",
         symbol: "memory",
-        unit: "B",
+        unit: "MiB",
         floor: Some(0.0),
         better: Better::Lower,
         definition: "peak resident memory of the job's process",
+    },
+    Metric {
+        name: "threads",
+        symbol: "threads",
+        unit: "",
+        floor: None,
+        better: Better::Neither,
+        definition: "threads that the job was given",
     },
 ];
 
@@ -121,6 +129,10 @@ pub const STOPS: &[(&str, &str)] = &[
         "the problem has no admissible solution, with the obstacles named",
     ),
     ("invalid-input", "a model or a setting cannot be used"),
+    (
+        "invalid-start",
+        "the start is outside the energy's domain and may not be mended",
+    ),
     ("time-limit", "the time of `limits` was used up"),
     ("memory-limit", "the memory of `limits` was used up"),
     ("cancelled", "the user asked to stop"),
@@ -128,37 +140,6 @@ pub const STOPS: &[(&str, &str)] = &[
     ("panicked", "the job ran into a defect of the program"),
     ("missing-model", "an optional model's file is absent"),
 ];
-
-impl Record {
-    /// The number that a column of this name shows: a metric, a counter or a measurement. None where there is none,
-    /// such as the metrics of a job that failed.
-    pub fn number(&self, column: &str) -> Option<f64> {
-        if let Some(value) = self.result.metrics.get(column) {
-            return Some(*value);
-        }
-        if let Some(count) = self.result.counters.get(column) {
-            return Some(*count as f64);
-        }
-        match column {
-            "seconds" => median(&self.measurement.wall_seconds),
-            "cpu_seconds" => median(&self.measurement.cpu_seconds),
-            "peak_memory" => Some(self.measurement.peak_memory as f64).filter(|&bytes| bytes > 0.0),
-            _ => None,
-        }
-    }
-}
-
-/// The middle value, or the mean of the two middle ones; none of an empty list.
-fn median(values: &[f64]) -> Option<f64> {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    let middle = sorted.len() / 2;
-    match sorted.len() {
-        0 => None,
-        odd if odd % 2 == 1 => Some(sorted[middle]),
-        _ => Some(0.5 * (sorted[middle - 1] + sorted[middle])),
-    }
-}
 
 mod word {
     /// The word for a number that JSON cannot hold.

@@ -42,7 +42,7 @@ pub enum Holds {
     AxisNames,
     /// A list of metrics, counters and measurements.
     Columns,
-    /// A trace, a column or an axis of numbers.
+    /// A trace, a column or an axis.
     Coordinate,
     /// Printed figures in place, or the path of their file.
     Published,
@@ -210,7 +210,7 @@ pub static TABLE: &[Key] = &[
     ),
 ];
 
-/// `published`, in place or as a file of its own.
+/// `published`, in place or in a file under the table's name.
 pub static PUBLISHED: &[Key] = &[
     key(
         "source",
@@ -228,7 +228,7 @@ pub static PUBLISHED: &[Key] = &[
         "rows",
         Holds::PublishedRows,
         true,
-        "Axis values that tell the jobs, and their figures by column name.",
+        "Axis values that tell the jobs, their figures by column name, and `tolerance`, relative, where the usual one does not fit.",
     ),
 ];
 
@@ -250,7 +250,7 @@ pub static PLOT: &[Key] = &[
         "x",
         Holds::Coordinate,
         true,
-        "A trace such as `iteration`, a column, or an axis of numbers.",
+        "A trace such as `iteration`, a column, or an axis.",
     ),
     key(
         "y",
@@ -389,7 +389,7 @@ pub static COMPARISON: &[Key] = &[
         "less_than",
         Holds::Condition,
         true,
-        "The other job: this one with these axis values instead of its own.",
+        "The other jobs: those with these axis values that agree in every other axis.",
     ),
     key(
         "factor",
@@ -398,6 +398,6 @@ pub static COMPARISON: &[Key] = &[
             max: f64::MAX,
         }),
         false,
-        "The value must be less than this many times the other job's; 1 when absent.",
+        "The value must be less than this many times the others'; 1 when absent.",
     ),
 ];

@@ -65,11 +65,14 @@ impl Axes {
         self.known.iter().map(|axis| axis.name.as_str())
     }
 
-    /// Axes with at least two values.
+    /// Axes with at least two different values.
     pub fn varying(&self) -> Vec<String> {
         self.known
             .iter()
-            .filter(|axis| axis.values.as_ref().is_none_or(|values| values.len() > 1))
+            .filter(|axis| match &axis.values {
+                Some(values) => values.iter().any(|value| *value != values[0]),
+                None => true,
+            })
             .map(|axis| axis.name.clone())
             .collect()
     }
@@ -207,10 +210,10 @@ pub fn read(
             checker.error(axis.span.clone(), message).help = Some("let one axis hold all values".to_owned());
         }
     }
-    let mut read_one = |axis: &Named<'_>| -> Known {
+    let mut read_one = |axis: &Named<'_>, zipped: bool| -> Known {
         let (sets, meant) = resolve(checker, method, axis);
         let values = match sets {
-            Some(sets) => values(checker, method, axis, sets, models, &used, broken_models),
+            Some(sets) => values(checker, method, axis, sets, models, &used, broken_models, zipped),
             None => None,
         };
         Known {
@@ -222,7 +225,7 @@ pub fn read(
     };
     let mut groups: Vec<Vec<Known>> = Vec::new();
     for axis in vary {
-        let known = read_one(axis);
+        let known = read_one(axis, false);
         axes.vary.push(Axis {
             name: known.name.clone(),
             values: known.values.clone().unwrap_or_default(),
@@ -230,39 +233,54 @@ pub fn read(
         axes.known.push(known);
     }
     for zip in zips {
-        groups.push(zip.iter().map(&mut read_one).collect());
+        groups.push(zip.iter().map(|axis| read_one(axis, true)).collect());
     }
     for (zip, group) in zips.iter().zip(groups) {
-        let count = |axis: &Named<'_>| match &axis.node.content {
-            Content::List(items) => Some(items.len()),
-            _ => None,
+        check_zip(checker, zip, &group);
+        let axis = |known: &Known| Axis {
+            name: known.name.clone(),
+            values: known.values.clone().unwrap_or_default(),
         };
-        for axis in zip.iter().skip(1) {
-            let (Some(expected), Some(found)) = (zip.first().and_then(count), count(axis)) else {
-                continue;
-            };
-            if expected != found {
-                let message = format!(
-                    "\"{}\" has {found} values, \"{}\" has {expected}",
-                    axis.name, zip[0].name
-                );
-                let diagnostic = checker.error(axis.node.span.clone(), message);
-                diagnostic.label = format!("expected {expected} values");
-                diagnostic.help = Some("the axes of a zip move together and need equally many values".to_owned());
-            }
-        }
-        axes.zips.push(
-            group
-                .iter()
-                .map(|known| Axis {
-                    name: known.name.clone(),
-                    values: known.values.clone().unwrap_or_default(),
-                })
-                .collect(),
-        );
+        axes.zips.push(group.iter().map(axis).collect());
         axes.known.extend(group);
     }
     axes
+}
+
+/// The axes of a zip have equally many values, and no row stands twice.
+fn check_zip(checker: &mut Checker, zip: &[Named<'_>], group: &[Known]) {
+    let items = |axis: &Named<'_>| match &axis.node.content {
+        Content::List(items) => items.len(),
+        _ => 0,
+    };
+    let Some(expected) = zip.first().map(items) else { return };
+    let mut even = true;
+    for axis in &zip[1..] {
+        let found = items(axis);
+        if found != expected && found > 0 && expected > 0 {
+            even = false;
+            let message = format!(
+                "\"{}\" has {found} values, \"{}\" has {expected}",
+                axis.name, zip[0].name
+            );
+            let diagnostic = checker.error(axis.node.span.clone(), message);
+            diagnostic.label = format!("expected {expected} values");
+            diagnostic.help = Some("the axes of a zip move together and need equally many values".to_owned());
+        }
+    }
+    let columns: Option<Vec<&Vec<Value>>> = group.iter().map(|axis| axis.values.as_ref()).collect();
+    if let (true, Some(columns)) = (even, columns) {
+        let row = |index: usize| columns.iter().map(|values| &values[index]).collect::<Vec<_>>();
+        if let Some(copy) = (0..expected).find(|&index| (0..index).any(|earlier| row(earlier) == row(index))) {
+            let words: Vec<String> = row(copy).into_iter().map(quoted).collect();
+            let message = format!("{} stand twice in a zip", words.join(", "));
+            let span = match &zip[0].node.content {
+                Content::List(items) => items[copy].span.clone(),
+                _ => zip[0].node.span.clone(),
+            };
+            checker.error(span, message).help = Some("remove one of the two".to_owned());
+        }
+    }
 }
 
 fn overlap(one: &str, other: &str) -> bool {
@@ -304,6 +322,7 @@ fn values(
     models: &[Model],
     used: &[&Model],
     broken: &BTreeSet<String>,
+    zipped: bool,
 ) -> Option<Vec<Value>> {
     let Content::List(items) = &axis.node.content else {
         let message = format!("axis \"{}\" is {}", axis.name, axis.node.content.describe());
@@ -363,7 +382,8 @@ fn values(
                 .and_then(|values| values.into_iter().next()),
         };
         match value {
-            Some(value) if found.contains(&value) => {
+            // Within a zip a value may come again; it is the whole row that must not.
+            Some(value) if !zipped && found.contains(&value) => {
                 well = false;
                 let message = format!("{} stands twice in axis \"{}\"", quoted(&value), axis.name);
                 checker.error(item.span.clone(), message).help = Some("remove one of the two".to_owned());

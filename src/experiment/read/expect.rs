@@ -145,43 +145,27 @@ fn column_expectation(checker: &mut Checker, entry: &Entry, context: &Context<'_
     }
 }
 
-/// The condition that tells the other job of each comparison; every job that is compared has exactly one other.
+/// The condition that tells the other jobs of each comparison: those that have its values and agree in every other axis.
 fn other_job(checker: &mut Checker, node: &Node, context: &Context<'_>, these: &Condition) -> Option<Condition> {
     let other = super::axes::condition(checker, node, "less_than", context.axes)?;
-    if let Some((axis, _)) = other.iter().find(|(_, values)| values.len() != 1) {
-        checker
-            .error(
-                node.span.clone(),
-                format!("\"less_than\" lists several values of \"{axis}\""),
-            )
-            .help = Some("name one job: write several expectations".to_owned());
-        return None;
-    }
     for point in context.points.iter().filter(|point| grid::matches(these, point)) {
-        let counterpart: Point = point
-            .iter()
-            .map(|(axis, value)| {
-                let value = other.get(axis).and_then(|values| values.first()).unwrap_or(value);
-                (axis.clone(), value.clone())
-            })
-            .collect();
-        let message = if counterpart == *point {
-            format!("the job with {} would be compared with itself", grid::describe(point))
-        } else if !context.points.contains(&counterpart) {
-            format!(
+        let agree = |candidate: &Point| {
+            let pairs = candidate.iter().zip(point);
+            pairs
+                .into_iter()
+                .all(|(theirs, ours)| other.contains_key(&theirs.0) || theirs == ours)
+        };
+        let partner = |candidate: &&Point| grid::matches(&other, candidate) && agree(candidate) && *candidate != point;
+        if !context.points.iter().any(|candidate| partner(&candidate)) {
+            let message = format!(
                 "the job with {} has no other to be compared with",
                 grid::describe(point)
-            )
-        } else {
-            continue;
-        };
-        let diagnostic = checker.error(node.span.clone(), message);
-        diagnostic.label = format!("no job has {}", grid::describe(&counterpart));
-        if counterpart == *point {
-            diagnostic.label.clear();
+            );
+            let diagnostic = checker.error(node.span.clone(), message);
+            diagnostic.label = "expected axis values that another job has, all else equal".to_owned();
+            diagnostic.help = Some("narrow the expectation with \"where\"".to_owned());
+            return None;
         }
-        diagnostic.help = Some("narrow the expectation with \"where\"".to_owned());
-        return None;
     }
     Some(other)
 }

@@ -53,7 +53,7 @@ fn table(checker: &mut Checker, node: &Node, context: &Context<'_>, names: &mut 
     let published = found
         .nodes
         .get("published")
-        .and_then(|entry| published::read(checker, &entry.value, context, &columns));
+        .and_then(|entry| published::read(checker, &entry.value, context, &name, &columns));
     Some(file::Table {
         title: found.text("title"),
         name,
@@ -247,12 +247,16 @@ pub fn unknown_column(checker: &mut Checker, span: Range<usize>, name: &str, con
 }
 
 /// What a coordinate may be; the same word may be several of these.
-#[derive(Clone, Copy, Default)]
+#[derive(Clone, Copy)]
 struct Meanings {
     trace: bool,
+    /// A column or an axis of numbers.
     number: bool,
+    /// An axis of words.
+    word: bool,
 }
 
+/// The names of x and y. `traces` where these may be plotted, and then x may be an axis of words too.
 fn coordinates(
     checker: &mut Checker,
     found: &Entries<'_>,
@@ -267,28 +271,36 @@ fn coordinates(
     };
     let (x, y) = (read("x"), read("y"));
     if let (Some((x_name, x)), Some((y_name, y)), Some(entry)) = (&x, &y, found.nodes.get("y"))
-        && !(x.trace && y.trace || x.number && y.number)
+        && !(x.trace && y.trace || (x.number || x.word) && y.number)
     {
-        let (is, other) = if y.trace {
-            ("a trace", "a number of each job")
-        } else {
-            ("a number of each job", "a trace")
+        let message = match (x.trace, y.trace) {
+            (true, _) => format!("\"{x_name}\" is a trace, \"{y_name}\" is one number of each job"),
+            (_, true) => format!("\"{y_name}\" is a trace, \"{x_name}\" is one value of each job"),
+            _ => format!("axis \"{y_name}\" has values that are no numbers"),
         };
-        let message = format!("\"{y_name}\" is {is}, \"{x_name}\" is {other}");
-        checker.error(entry.value.span.clone(), message).help = Some("plot a trace against a trace".to_owned());
+        let known: Vec<&str> = if x.trace {
+            context.method.traces().iter().map(|(trace, _)| *trace).collect()
+        } else {
+            column::columns(context.method)
+                .iter()
+                .map(|column| column.name)
+                .collect()
+        };
+        checker.error(entry.value.span.clone(), message).help = suggestion("", known);
     }
     (x.map(|(name, _)| name), y.map(|(name, _)| name))
 }
 
-fn meanings(checker: &mut Checker, entry: &Entry, name: &str, context: &Context<'_>, traces: bool) -> Option<Meanings> {
+fn meanings(checker: &mut Checker, entry: &Entry, name: &str, context: &Context<'_>, plot: bool) -> Option<Meanings> {
     let axis = context.axes.find(name);
-    let numeric = |value: &Value| value.is_number();
+    let numeric = |values: &Vec<Value>| values.iter().all(Value::is_number);
+    let numbers = axis.is_some_and(|axis| axis.values.as_ref().is_none_or(numeric));
     let meanings = Meanings {
-        trace: traces && context.method.traces().iter().any(|(trace, _)| *trace == name),
-        number: column::find(context.method, name).is_some()
-            || axis.is_some_and(|axis| axis.values.as_ref().is_none_or(|values| values.iter().all(numeric))),
+        trace: plot && context.method.traces().iter().any(|(trace, _)| *trace == name),
+        number: column::find(context.method, name).is_some() || numbers,
+        word: plot && axis.is_some() && !numbers,
     };
-    if meanings.trace || meanings.number {
+    if meanings.trace || meanings.number || meanings.word {
         return Some(meanings);
     }
     let span = entry.value.span.clone();
@@ -298,24 +310,18 @@ fn meanings(checker: &mut Checker, entry: &Entry, name: &str, context: &Context<
             .help = Some("use it in \"series\"".to_owned());
         return None;
     }
-    let trace_names = context
-        .method
-        .traces()
-        .iter()
-        .map(|(trace, _)| *trace)
-        .filter(|_| traces);
+    let traces = context.method.traces().iter().map(|(trace, _)| *trace).filter(|_| plot);
     let columns = column::columns(context.method);
-    let known: Vec<&str> = trace_names
+    let known: Vec<&str> = traces
         .chain(columns.iter().map(|column| column.name))
         .chain(context.axes.names())
         .collect();
-    let what = if traces {
+    let what = if plot {
         "trace, metric or axis"
     } else {
         "metric or axis"
     };
-    let help = suggestion(name, known);
-    checker.error(span, format!("unknown {what} \"{name}\"")).help = help;
+    checker.error(span, format!("unknown {what} \"{name}\"")).help = suggestion(name, known);
     None
 }
 

@@ -1,7 +1,9 @@
 //! Reads printed figures: in place, or from a TOML file beside the experiment.
 //!
-//! A file holds one printed table, `source = "..."` and `[[rows]]`, so that several experiments may use it. A row belongs
-//! to every job whose axes have the row's values; its other entries are figures by column name.
+//! A file holds printed tables by the names of the tables that they stand beside, so that several experiments may use it:
+//! `[distortion]` with `source = "..."`, then `[[distortion.rows]]`. A row belongs to every job whose axes have the row's
+//! values; its other entries are figures by column name. Of a file's figures those that the table has no column for are
+//! left out.
 
 use super::outputs::unknown_column;
 use super::{Context, axes, entries};
@@ -11,7 +13,7 @@ use crate::experiment::diagnostic::Source;
 use crate::experiment::document::{self, Content, Node, Table};
 use crate::experiment::file::Published;
 use crate::experiment::grid;
-use crate::experiment::nearest::nearest;
+use crate::experiment::nearest::{nearest, suggestion};
 use crate::experiment::section::PUBLISHED;
 use crate::method::setting::Kind;
 use serde_json::Value;
@@ -19,9 +21,15 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// The printed figures of a table with these columns.
-pub fn read(checker: &mut Checker, node: &Node, context: &Context<'_>, columns: &[String]) -> Option<Published> {
+pub fn read(
+    checker: &mut Checker,
+    node: &Node,
+    context: &Context<'_>,
+    name: &str,
+    columns: &[String],
+) -> Option<Published> {
     match &node.content {
-        Content::Table(table) => read_table(checker, table, node.span.clone(), context, Some(columns)),
+        Content::Table(table) => read_table(checker, table, node.span.clone(), context, columns, true),
         Content::Text(path) => {
             let path = context.folder.join(path);
             let text = match std::fs::read_to_string(&path) {
@@ -44,8 +52,17 @@ pub fn read(checker: &mut Checker, node: &Node, context: &Context<'_>, columns: 
                     return None;
                 }
             };
+            let Some(entry) = table.get(name) else {
+                let message = format!("{} has no table [{name}]", path.display());
+                let known = table.entries.iter().map(|entry| entry.key.as_str());
+                checker.error(node.span.clone(), message).help = suggestion(name, known);
+                return None;
+            };
             let mut inner = Checker::new(source);
-            let published = read_table(&mut inner, &table, 0..0, context, None);
+            let published = inner.table(&entry.value, name).and_then(|table| {
+                let owner = entry.value.span.clone();
+                read_table(&mut inner, table, owner, context, columns, false)
+            });
             checker.diagnostics.extend(inner.diagnostics);
             published
         }
@@ -60,13 +77,14 @@ pub fn read(checker: &mut Checker, node: &Node, context: &Context<'_>, columns: 
     }
 }
 
-/// `columns` is none for a file, which may hold more than one table shows.
+/// `strict` when figures without a column are errors; a file may hold more than one experiment shows.
 fn read_table(
     checker: &mut Checker,
     table: &Table,
     owner: std::ops::Range<usize>,
     context: &Context<'_>,
-    columns: Option<&[String]>,
+    columns: &[String],
+    strict: bool,
 ) -> Option<Published> {
     let found = entries(checker, PUBLISHED, table, "published", owner, false);
     let mut rows = Vec::new();
@@ -77,7 +95,7 @@ fn read_table(
         }
         rows = items
             .iter()
-            .filter_map(|item| read_row(checker, item, context, columns))
+            .filter_map(|item| read_row(checker, item, context, columns, strict))
             .collect();
     }
     Some(Published {
@@ -91,7 +109,8 @@ fn read_row(
     checker: &mut Checker,
     node: &Node,
     context: &Context<'_>,
-    columns: Option<&[String]>,
+    columns: &[String],
+    strict: bool,
 ) -> Option<BTreeMap<String, Value>> {
     let table = checker.table(node, "rows")?;
     let mut cells = Vec::new();
@@ -106,16 +125,27 @@ fn read_row(
                 condition.push((axis.name.clone(), value.clone()));
                 row.insert(axis.name.clone(), value);
             }
-        } else if column::find(context.method, &cell.name).is_some() {
-            let any = Kind::Number {
-                min: f64::MIN,
+        } else if cell.name == "tolerance" {
+            let relative = Kind::Number {
+                min: 0.0,
                 max: f64::MAX,
             };
-            if let Some(value) = checker.value(&any, cell.node, &cell.name) {
-                figures += 1;
+            if let Some(value) = checker.value(&relative, cell.node, &cell.name) {
                 row.insert(cell.name.clone(), value);
             }
-            if columns.is_some_and(|columns| !columns.contains(&cell.name)) {
+        } else if column::find(context.method, &cell.name).is_some() {
+            figures += 1;
+            let value = match cell.node.content {
+                Content::Integer(value) => Value::from(value),
+                Content::Number(value) if value.is_finite() => Value::from(value),
+                _ => {
+                    checker.wrong_type(cell.node, &cell.name, "the printed number");
+                    continue;
+                }
+            };
+            if columns.contains(&cell.name) {
+                row.insert(cell.name.clone(), value);
+            } else if strict {
                 checker
                     .error(
                         cell.span.clone(),

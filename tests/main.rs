@@ -1,2 +1,3 @@
-#[test]
-fn t() {}
+//! One test binary; a file a property.
+
+mod floors;

@@ -1,6 +1,7 @@
 //! The command line: one command a file, each with its arguments and its `execute`.
 
 mod list;
+mod mesh;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
@@ -36,6 +37,7 @@ const EXIT_CODES: &str = "Exit codes: 0 all well, 1 an expectation was not met, 
 #[derive(Subcommand)]
 enum Command {
     List(list::Arguments),
+    Mesh(mesh::Arguments),
 }
 
 /// Reads the process's arguments and runs the command that they name.
@@ -54,6 +56,7 @@ pub fn main() -> ExitCode {
     };
     let exit = match arguments.command {
         Command::List(arguments) => list::execute(arguments),
+        Command::Mesh(arguments) => mesh::execute(arguments),
     };
     ExitCode::from(exit as u8)
 }

@@ -2,6 +2,8 @@
 //!
 //! Nothing here opens a file: readers take bytes, writers take `std::io::Write`.
 
+pub mod format;
+
 /// A mesh of cells with `N` vertices each: `points` in model units, `cells` as indices into `points`.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Mesh<const N: usize> {

@@ -1,7 +1,7 @@
 //! Two result sets side by side: each figure of each job that both have, with its difference.
 
-use std::fmt::Write;
 use super::number::round;
+use std::fmt::Write;
 
 /// A `jobs.csv` as read back.
 #[derive(Clone, Debug, PartialEq)]
@@ -11,8 +11,19 @@ pub struct Sheet {
 }
 
 /// Columns that name or describe a job rather than measure its result.
-const WORDS: &[&str] =
-    &["reason", "repetitions", "exclusive", "timed", "version", "commit", "target", "host", "notices", "key", "threads"];
+const WORDS: &[&str] = &[
+    "reason",
+    "repetitions",
+    "exclusive",
+    "timed",
+    "version",
+    "commit",
+    "target",
+    "host",
+    "notices",
+    "key",
+    "threads",
+];
 
 /// Columns whose differences are those of machines and moments: shown, never counted.
 const MEASUREMENTS: &[&str] = &["seconds", "cpu_seconds", "peak_memory"];
@@ -21,13 +32,22 @@ impl Sheet {
     /// Reads a `jobs.csv`.
     pub fn read(bytes: &[u8]) -> Result<Sheet, String> {
         let mut reader = csv::Reader::from_reader(bytes);
-        let head: Vec<String> = reader.headers().map_err(|error| error.to_string())?.iter().map(String::from).collect();
+        let head: Vec<String> = reader
+            .headers()
+            .map_err(|error| error.to_string())?
+            .iter()
+            .map(String::from)
+            .collect();
         if head.first().map(String::as_str) != Some("job") {
             return Err("the first column is not `job`: this is no jobs.csv of vargeo".into());
         }
         let mut jobs: Vec<Vec<String>> = Vec::new();
         for record in reader.records() {
-            let job: Vec<String> = record.map_err(|error| error.to_string())?.iter().map(String::from).collect();
+            let job: Vec<String> = record
+                .map_err(|error| error.to_string())?
+                .iter()
+                .map(String::from)
+                .collect();
             if jobs.iter().any(|other| other[0] == job[0]) {
                 return Err(format!("job {} is there twice", job[0]));
             }
@@ -88,11 +108,15 @@ pub fn compare(left: &Sheet, right: &Sheet) -> Comparison {
         ..Comparison::default()
     };
     for job in &left.jobs {
-        let Some(other) = right.jobs.iter().find(|other| other[0] == job[0]) else { continue };
+        let Some(other) = right.jobs.iter().find(|other| other[0] == job[0]) else {
+            continue;
+        };
         comparison.jobs += 1;
         for (column, value) in left.head.iter().zip(job).skip(1) {
             let bare = column.split(" [").next().unwrap_or(column);
-            let Some(index) = right.head.iter().position(|name| name == column) else { continue };
+            let Some(index) = right.head.iter().position(|name| name == column) else {
+                continue;
+            };
             if WORDS.contains(&bare) {
                 continue;
             }
@@ -129,13 +153,16 @@ pub fn describe(comparison: &Comparison, left: &str, right: &str) -> String {
         comparison.results().count()
     );
     for (title, measured) in [("results", false), ("measurements", true)] {
-        let chosen: Vec<&Difference> =
-            comparison.differences.iter().filter(|difference| difference.measured == measured).collect();
+        let chosen: Vec<&Difference> = comparison
+            .differences
+            .iter()
+            .filter(|difference| difference.measured == measured)
+            .collect();
         if chosen.is_empty() {
             continue;
         }
         let mut table = comfy_table::Table::new();
-        table.load_preset(comfy_table::presets::NOTHING);
+        table.load_style(comfy_table::presets::NOTHING);
         table.set_header([title, "job", left, right, "difference"]);
         for difference in chosen {
             table.add_row([
@@ -161,7 +188,11 @@ pub fn describe(comparison: &Comparison, left: &str, right: &str) -> String {
         ("columns", right, &comparison.columns_right),
     ] {
         if !names.is_empty() {
-            let _ = writeln!(text, "\nonly {side} has the {what} {}", super::table::terminal::plain(&names.join(", ")));
+            let _ = writeln!(
+                text,
+                "\nonly {side} has the {what} {}",
+                super::table::terminal::plain(&names.join(", "))
+            );
         }
     }
     text

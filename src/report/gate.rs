@@ -7,7 +7,7 @@
 use super::number;
 use super::rate::Fit;
 use super::row::{Quantity, Row, label, same};
-use crate::experiment::file::{Bound, Condition, Experiment, Expectation};
+use crate::experiment::file::{Bound, Condition, Expectation, Experiment};
 use crate::experiment::record::Status;
 
 /// Whether an expectation was met.
@@ -104,7 +104,11 @@ fn judge_expectation(experiment: &Experiment, expectation: &Expectation, rows: &
             let partners = partners(row, &comparison.other, rows);
             if partners.is_empty() {
                 push(
-                    format!("{} less than {factor}that with {}", comparison.metric, written(&comparison.other)),
+                    format!(
+                        "{} less than {factor}that with {}",
+                        comparison.metric,
+                        written(&comparison.other)
+                    ),
                     "no job differs from this one in these axes only".into(),
                     false,
                 );
@@ -138,9 +142,10 @@ fn partners<'a>(row: &Row, other: &Condition, rows: &'a [Row]) -> Vec<&'a Row> {
         .filter(|candidate| {
             candidate.matches(other)
                 && candidate.name != row.name
-                && candidate.axes.iter().all(|(axis, value)| {
-                    other.contains_key(axis) || row.axis(axis).is_some_and(|own| same(own, value))
-                })
+                && candidate
+                    .axes
+                    .iter()
+                    .all(|(axis, value)| other.contains_key(axis) || row.axis(axis).is_some_and(|own| same(own, value)))
         })
         .collect()
 }
@@ -174,7 +179,11 @@ fn found(row: &Row, value: Option<f64>, digits: usize) -> String {
 fn ended(row: &Row) -> String {
     let reason = &row.record.result.reason;
     let word = super::table::word(row);
-    if reason.is_empty() { word.to_string() } else { format!("{word}: {reason}") }
+    if reason.is_empty() {
+        word.to_string()
+    } else {
+        format!("{word}: {reason}")
+    }
 }
 
 /// Whether a number lies within a bound; not-a-number never does.
@@ -204,7 +213,11 @@ pub fn describe(bound: &Bound) -> String {
             None => format!("exactly {}", plain(equals)),
         });
     }
-    if parts.is_empty() { "present".into() } else { parts.join(" and ") }
+    if parts.is_empty() {
+        "present".into()
+    } else {
+        parts.join(" and ")
+    }
 }
 
 /// A condition in words: `energy = stretch and model = ball or duck`.

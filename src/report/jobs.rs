@@ -23,17 +23,39 @@ pub fn write(experiment: &Experiment, rows: &[Row]) -> Result<Vec<u8>, ReportErr
         .map(String::as_str)
         .filter(|name| declared.iter().all(|metric| metric.name != *name))
         .collect();
-    let counters: BTreeSet<&str> =
-        rows.iter().flat_map(|row| row.record.result.counters.keys()).map(String::as_str).collect();
+    let counters: BTreeSet<&str> = rows
+        .iter()
+        .flat_map(|row| row.record.result.counters.keys())
+        .map(String::as_str)
+        .collect();
 
-    let unit = |name: &str, unit: &str| if unit.is_empty() { name.to_string() } else { format!("{name} [{unit}]") };
+    let unit = |name: &str, unit: &str| {
+        if unit.is_empty() {
+            name.to_string()
+        } else {
+            format!("{name} [{unit}]")
+        }
+    };
     let mut head: Vec<String> = vec!["job".into()];
     head.extend(axes.iter().map(|axis| axis.to_string()));
     head.extend(["status", "stop", "reason"].map(String::from));
     head.extend(declared.iter().map(|metric| unit(metric.name, metric.unit)));
     head.extend(others.iter().chain(&counters).map(|name| name.to_string()));
     head.extend(MEASURED.iter().map(|measured| unit(measured.name, measured.unit)));
-    head.extend(["repetitions", "exclusive", "timed", "version", "commit", "target", "host", "notices", "key"].map(String::from));
+    head.extend(
+        [
+            "repetitions",
+            "exclusive",
+            "timed",
+            "version",
+            "commit",
+            "target",
+            "host",
+            "notices",
+            "key",
+        ]
+        .map(String::from),
+    );
 
     let mut writer = csv::Writer::from_writer(Vec::new());
     let place = |error: csv::Error| ReportError::Csv("jobs.csv".into(), error.to_string());
@@ -44,18 +66,28 @@ pub fn write(experiment: &Experiment, rows: &[Row]) -> Result<Vec<u8>, ReportErr
         let metric = |name: &str| result.metrics.get(name).map_or_else(String::new, |&value| exact(value));
         let mut fields: Vec<String> = vec![row.name.clone()];
         fields.extend(axes.iter().map(|axis| {
-            row.axes.iter().find(|(name, _)| name == axis).map_or_else(String::new, |(_, value)| match value {
-                Value::String(text) => text.clone(),
-                other => other.to_string(),
-            })
+            row.axes
+                .iter()
+                .find(|(name, _)| name == axis)
+                .map_or_else(String::new, |(_, value)| match value {
+                    Value::String(text) => text.clone(),
+                    other => other.to_string(),
+                })
         }));
         fields.extend([status(result.status).into(), result.stop.clone(), result.reason.clone()]);
         fields.extend(declared.iter().map(|declared| metric(declared.name)));
         fields.extend(others.iter().map(|name| metric(name)));
+        fields.extend(counters.iter().map(|name| {
+            result
+                .counters
+                .get(*name)
+                .map_or_else(String::new, |count| count.to_string())
+        }));
         fields.extend(
-            counters.iter().map(|name| result.counters.get(*name).map_or_else(String::new, |count| count.to_string())),
+            MEASURED
+                .iter()
+                .map(|measured| measured.of(row).map_or_else(String::new, exact)),
         );
-        fields.extend(MEASURED.iter().map(|measured| measured.of(row).map_or_else(String::new, exact)));
         fields.extend([
             measurement.wall_seconds.len().to_string(),
             if measurement.exclusive { "yes" } else { "no" }.into(),
@@ -69,7 +101,9 @@ pub fn write(experiment: &Experiment, rows: &[Row]) -> Result<Vec<u8>, ReportErr
         ]);
         writer.write_record(&fields).map_err(place)?;
     }
-    writer.into_inner().map_err(|error| ReportError::Csv("jobs.csv".into(), error.to_string()))
+    writer
+        .into_inner()
+        .map_err(|error| ReportError::Csv("jobs.csv".into(), error.to_string()))
 }
 
 /// The word for how a job ended.

@@ -37,7 +37,11 @@ pub fn write(name: &str, rows: &[Row], verdicts: &[Verdict]) -> Result<String, q
         if verdict.outcome != Outcome::Met {
             status.set_message(format!("expected {}, found {}", verdict.expected, verdict.found));
         }
-        let subject = if verdict.subject.is_empty() { "no job" } else { &verdict.subject };
+        let subject = if verdict.subject.is_empty() {
+            "no job"
+        } else {
+            &verdict.subject
+        };
         let mut case = TestCase::new(format!("{subject}: {}", verdict.expected), status);
         case.set_classname(format!("{name} {}", verdict.place));
         expectations.add_test_case(case);

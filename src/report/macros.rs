@@ -13,7 +13,12 @@ pub fn write(experiment: &Experiment, rows: &[Row], rates: &[super::rate::Fit]) 
          \\else\\errmessage{vargeo: no figure #2 of #1}\\fi}\n",
     );
     let mut define = |first: &str, second: &str, value: &str| {
-        let _ = writeln!(text, "\\expandafter\\def\\csname vargeo@{}@{}\\endcsname{{{value}}}", name(first), name(second));
+        let _ = writeln!(
+            text,
+            "\\expandafter\\def\\csname vargeo@{}@{}\\endcsname{{{value}}}",
+            name(first),
+            name(second)
+        );
     };
     for row in rows {
         let result = &row.record.result;
@@ -38,6 +43,12 @@ pub fn write(experiment: &Experiment, rows: &[Row], rates: &[super::rate::Fit]) 
 /// A name that TeX reads as itself within `\csname`.
 fn name(text: &str) -> String {
     text.chars()
-        .map(|character| if matches!(character, '\\' | '{' | '}' | '%' | '#' | '~' | '^' | '&' | '$') { '-' } else { character })
+        .map(|character| {
+            if matches!(character, '\\' | '{' | '}' | '%' | '#' | '~' | '^' | '&' | '$') {
+                '-'
+            } else {
+                character
+            }
+        })
         .collect()
 }

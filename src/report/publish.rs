@@ -22,6 +22,7 @@ pub fn publish(folder: &Path, name: &str, bytes: &[u8]) -> Result<PathBuf, Repor
     // Temporary files are private to their owner; a result is as readable as any other file.
     let mode = std::os::unix::fs::PermissionsExt::from_mode(0o644);
     file.as_file().set_permissions(mode).map_err(place)?;
-    file.persist(&path).map_err(|error| ReportError::Write(path.clone(), error.error))?;
+    file.persist(&path)
+        .map_err(|error| ReportError::Write(path.clone(), error.error))?;
     Ok(path)
 }

@@ -63,7 +63,11 @@ pub fn fit(points: &[(f64, f64)]) -> Option<Line> {
 
 /// Every rate of the experiment, a fit for each series in the order of the jobs.
 pub fn fits(experiment: &Experiment, rows: &[Row]) -> Vec<Fit> {
-    experiment.rates.iter().flat_map(|rate| fit_series(rate, rows)).collect()
+    experiment
+        .rates
+        .iter()
+        .flat_map(|rate| fit_series(rate, rows))
+        .collect()
 }
 
 fn fit_series(rate: &Rate, rows: &[Row]) -> Vec<Fit> {
@@ -88,8 +92,12 @@ fn fit_series(rate: &Rate, rows: &[Row]) -> Vec<Fit> {
             (Some(x), Some(y)) => {
                 if rate.window.is_none_or(|[low, high]| (low..=high).contains(&x)) {
                     let seed = |axis: &str| axis.rsplit('.').next() == Some("seed");
-                    let seeds: Vec<String> =
-                        row.axes.iter().filter(|(axis, _)| seed(axis)).map(|(_, value)| label(value)).collect();
+                    let seeds: Vec<String> = row
+                        .axes
+                        .iter()
+                        .filter(|(axis, _)| seed(axis))
+                        .map(|(_, value)| label(value))
+                        .collect();
                     points.push(Point {
                         x,
                         y,
@@ -110,7 +118,11 @@ fn fit_series(rate: &Rate, rows: &[Row]) -> Vec<Fit> {
                     None => groups.push((&point.seed, vec![(point.x, point.y)])),
                 }
             }
-            let slopes: Vec<f64> = groups.iter().filter_map(|group| fit(&group.1)).map(|line| line.slope).collect();
+            let slopes: Vec<f64> = groups
+                .iter()
+                .filter_map(|group| fit(&group.1))
+                .map(|line| line.slope)
+                .collect();
             let spread = (slopes.len() > 1).then(|| {
                 let low = slopes.iter().copied().fold(f64::INFINITY, f64::min);
                 let high = slopes.iter().copied().fold(f64::NEG_INFINITY, f64::max);
@@ -152,7 +164,9 @@ fn last_pair(points: &[(f64, f64)]) -> Option<f64> {
             _ => means.push((x, y, 1.0)),
         }
     }
-    let [.., before, last] = means.as_slice() else { return None };
+    let [.., before, last] = means.as_slice() else {
+        return None;
+    };
     Some((last.1 / last.2 - before.1 / before.2) / (last.0 - before.0))
 }
 
@@ -160,7 +174,11 @@ impl Fit {
     /// The fit in one sentence, such as `error against h, ball: slope 1.98 ± 0.03 over 5 points; last pair 1.995`.
     pub fn sentence(&self) -> String {
         use super::number::round;
-        let series = if self.series.is_empty() { String::new() } else { format!(", {}", self.series) };
+        let series = if self.series.is_empty() {
+            String::new()
+        } else {
+            format!(", {}", self.series)
+        };
         let mut text = format!("{} against {}{series}: ", self.y, self.x);
         match self.line {
             Some(line) => {
@@ -183,7 +201,12 @@ impl Fit {
             ));
         }
         if let Some([low, high]) = self.window {
-            text.push_str(&format!("; {} within {} to {}", self.x, round(low, 4).plain(), round(high, 4).plain()));
+            text.push_str(&format!(
+                "; {} within {} to {}",
+                self.x,
+                round(low, 4).plain(),
+                round(high, 4).plain()
+            ));
         }
         if self.left_out > 0 {
             text.push_str(&format!("; {} jobs without usable figures", self.left_out));

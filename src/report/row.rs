@@ -58,14 +58,18 @@ impl Row {
 
     /// Whether every axis has one of the values asked for. An axis or setting that the job has not matches nothing.
     pub fn matches(&self, condition: &Condition) -> bool {
-        condition
-            .iter()
-            .all(|(axis, values)| self.axis(axis).is_some_and(|own| values.iter().any(|value| same(own, value))))
+        condition.iter().all(|(axis, values)| {
+            self.axis(axis)
+                .is_some_and(|own| values.iter().any(|value| same(own, value)))
+        })
     }
 
     /// The values of these axes as one text, such as `ball, stretch`.
     pub fn labels(&self, axes: &[String]) -> String {
-        let parts: Vec<String> = axes.iter().map(|axis| self.axis(axis).map_or_else(String::new, label)).collect();
+        let parts: Vec<String> = axes
+            .iter()
+            .map(|axis| self.axis(axis).map_or_else(String::new, label))
+            .collect();
         parts.join(", ")
     }
 }
@@ -183,7 +187,11 @@ impl Quantity {
             };
         }
         if let Some(measured) = MEASURED.iter().find(|measured| measured.name == name) {
-            let better = if name == "threads" { Better::Neither } else { Better::Lower };
+            let better = if name == "threads" {
+                Better::Neither
+            } else {
+                Better::Lower
+            };
             return Quantity {
                 name: name.into(),
                 symbol: name.replace('_', " "),

@@ -25,7 +25,9 @@ fn dot(left: [f64; 3], right: [f64; 3]) -> f64 {
 impl Plane {
     /// The plane through the middle of the points, square to the axis that points most at the eye; what is nearer goes.
     pub fn towards(eye: [f64; 3], points: &[[f64; 3]]) -> Plane {
-        let axis = (0..3).max_by(|&left, &right| eye[left].abs().total_cmp(&eye[right].abs())).unwrap_or(0);
+        let axis = (0..3)
+            .max_by(|&left, &right| eye[left].abs().total_cmp(&eye[right].abs()))
+            .unwrap_or(0);
         let low = points.iter().map(|point| point[axis]).fold(f64::INFINITY, f64::min);
         let high = points.iter().map(|point| point[axis]).fold(f64::NEG_INFINITY, f64::max);
         let mut normal = [0.0; 3];
@@ -56,7 +58,11 @@ pub fn boundary(tetrahedra: &[[u32; 4]]) -> Vec<([u32; 3], u32)> {
     let mut boundary = Vec::new();
     let mut start = 0;
     while start < faces.len() {
-        let end = start + faces[start..].iter().take_while(|face| face.0 == faces[start].0).count();
+        let end = start
+            + faces[start..]
+                .iter()
+                .take_while(|face| face.0 == faces[start].0)
+                .count();
         if end - start == 1 {
             boundary.push((faces[start].1, faces[start].2));
         }
@@ -70,7 +76,12 @@ pub fn facets(solid: &Solid, points: &[[f64; 3]], plane: Option<&Plane>) -> Vec<
     let faces: Vec<([u32; 3], u32)> = if solid.is_volume() {
         boundary(&solid.tetrahedra)
     } else {
-        solid.triangles.iter().zip(0..).map(|(triangle, index)| (*triangle, index)).collect()
+        solid
+            .triangles
+            .iter()
+            .zip(0..)
+            .map(|(triangle, index)| (*triangle, index))
+            .collect()
     };
     let at = |index: u32| points[index as usize];
     let mut facets: Vec<Facet> = Vec::with_capacity(faces.len());
@@ -126,7 +137,13 @@ fn section(corners: [[f64; 3]; 4], plane: &Plane) -> Vec<[f64; 3]> {
     let heights = corners.map(|corner| plane.height(corner));
     let below: Vec<usize> = (0..4).filter(|&corner| heights[corner] <= 0.0).collect();
     let above: Vec<usize> = (0..4).filter(|&corner| heights[corner] > 0.0).collect();
-    let crossing = |from: usize, to: usize| between(corners[from], corners[to], heights[from] / (heights[from] - heights[to]));
+    let crossing = |from: usize, to: usize| {
+        between(
+            corners[from],
+            corners[to],
+            heights[from] / (heights[from] - heights[to]),
+        )
+    };
     match (below.as_slice(), above.as_slice()) {
         ([one], [a, b, c]) | ([a, b, c], [one]) => [a, b, c].map(|&other| crossing(*one, other)).to_vec(),
         ([a, b], [c, d]) => vec![crossing(*a, *c), crossing(*a, *d), crossing(*b, *d), crossing(*b, *c)],

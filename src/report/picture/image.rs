@@ -4,7 +4,10 @@ use std::collections::BTreeMap;
 
 /// Averages squares of `by` pixels of red, green, blue and returns red, green, blue, opacity.
 pub fn shrink(pixels: &[u8], width: usize, height: usize, by: usize) -> Vec<u8> {
-    let clear: Vec<u8> = pixels.chunks_exact(3).flat_map(|pixel| [pixel[0], pixel[1], pixel[2], 255]).collect();
+    let clear: Vec<u8> = pixels
+        .chunks_exact(3)
+        .flat_map(|pixel| [pixel[0], pixel[1], pixel[2], 255])
+        .collect();
     shrink_clear(&clear, width, height, by)
 }
 
@@ -50,13 +53,22 @@ pub fn palette_png(pixels: &[u8], width: usize, height: usize, most: usize) -> R
     for pixel in pixels.chunks_exact(4) {
         *counts.entry(coarse(pixel)).or_default() += 1;
     }
-    let palette = choose(counts.iter().map(|(colour, count)| (*colour, *count)).collect(), most.min(256));
+    let palette = choose(
+        counts.iter().map(|(colour, count)| (*colour, *count)).collect(),
+        most.min(256),
+    );
     let mut nearest: BTreeMap<[u8; 4], u8> = BTreeMap::new();
     for colour in counts.keys() {
         let distance = |entry: &[u8; 4]| -> i32 {
-            colour.iter().zip(entry).map(|(left, right)| (i32::from(*left) - i32::from(*right)).pow(2)).sum()
+            colour
+                .iter()
+                .zip(entry)
+                .map(|(left, right)| (i32::from(*left) - i32::from(*right)).pow(2))
+                .sum()
         };
-        let index = (0..palette.len()).min_by_key(|&index| distance(&palette[index])).unwrap_or(0);
+        let index = (0..palette.len())
+            .min_by_key(|&index| distance(&palette[index]))
+            .unwrap_or(0);
         nearest.insert(*colour, index as u8);
     }
     let indices: Vec<u8> = pixels.chunks_exact(4).map(|pixel| nearest[&coarse(pixel)]).collect();
@@ -67,14 +79,26 @@ pub fn palette_png(pixels: &[u8], width: usize, height: usize, most: usize) -> R
     } else {
         indices
             .chunks(width)
-            .flat_map(|row| row.chunks(2).map(|pair| pair[0] << 4 | pair.get(1).copied().unwrap_or(0)))
+            .flat_map(|row| {
+                row.chunks(2)
+                    .map(|pair| pair[0] << 4 | pair.get(1).copied().unwrap_or(0))
+            })
             .collect()
     };
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, width as u32, height as u32);
     encoder.set_color(png::ColorType::Indexed);
-    encoder.set_depth(if bits == 8 { png::BitDepth::Eight } else { png::BitDepth::Four });
-    encoder.set_palette(palette.iter().flat_map(|colour| [colour[0], colour[1], colour[2]]).collect::<Vec<u8>>());
+    encoder.set_depth(if bits == 8 {
+        png::BitDepth::Eight
+    } else {
+        png::BitDepth::Four
+    });
+    encoder.set_palette(
+        palette
+            .iter()
+            .flat_map(|colour| [colour[0], colour[1], colour[2]])
+            .collect::<Vec<u8>>(),
+    );
     if palette.iter().any(|colour| colour[3] < 255) {
         encoder.set_trns(palette.iter().map(|colour| colour[3]).collect::<Vec<u8>>());
     }
@@ -106,7 +130,10 @@ fn choose(colours: Vec<([u8; 4], u32)>, most: usize) -> Vec<[u8; 4]> {
     };
     let mut boxes: Vec<Box> = vec![colours];
     while boxes.len() < most {
-        let Some(index) = (0..boxes.len()).filter(|&index| boxes[index].len() > 1).max_by_key(|&index| (weight(&boxes[index]), usize::MAX - index)) else {
+        let Some(index) = (0..boxes.len())
+            .filter(|&index| boxes[index].len() > 1)
+            .max_by_key(|&index| (weight(&boxes[index]), usize::MAX - index))
+        else {
             break;
         };
         let mut split = std::mem::take(&mut boxes[index]);
@@ -128,7 +155,10 @@ fn choose(colours: Vec<([u8; 4], u32)>, most: usize) -> Vec<[u8; 4]> {
         .map(|colours| {
             let total: u64 = colours.iter().map(|colour| u64::from(colour.1)).sum();
             [0, 1, 2, 3].map(|part| {
-                let sum: u64 = colours.iter().map(|colour| u64::from(colour.0[part]) * u64::from(colour.1)).sum();
+                let sum: u64 = colours
+                    .iter()
+                    .map(|colour| u64::from(colour.0[part]) * u64::from(colour.1))
+                    .sum();
                 ((sum + total / 2) / total.max(1)) as u8
             })
         })

@@ -24,7 +24,11 @@ fn minus(left: Vector, right: Vector) -> Vector {
 
 fn unit(vector: Vector) -> Vector {
     let length = dot(vector, vector).sqrt();
-    if length > 0.0 { vector.map(|part| part / length) } else { [0.0, 0.0, 1.0] }
+    if length > 0.0 {
+        vector.map(|part| part / length)
+    } else {
+        [0.0, 0.0, 1.0]
+    }
 }
 
 /// A picture in red, green, blue, opacity; the mesh fills it but for a margin. `eye` points from the mesh to the eye, the
@@ -70,11 +74,19 @@ pub fn render(
         pixels: vec![0; 4 * width * height],
         depth: vec![f64::NEG_INFINITY; width * height],
     };
-    let light = unit([eye[0] + 0.25 * up[0] - 0.3 * right[0], eye[1] + 0.25 * up[1] - 0.3 * right[1], eye[2] + 0.25 * up[2]]);
+    let light = unit([
+        eye[0] + 0.25 * up[0] - 0.3 * right[0],
+        eye[1] + 0.25 * up[1] - 0.3 * right[1],
+        eye[2] + 0.25 * up[2],
+    ]);
     for facet in facets {
         let corners: Vec<Vector> = facet.corners.iter().map(|corner| screen(*corner)).collect();
         let normal = normal(&facet.corners);
-        let shade = if facet.section { 1.0 } else { 0.42 + 0.5 * dot(normal, light).abs() };
+        let shade = if facet.section {
+            1.0
+        } else {
+            0.42 + 0.5 * dot(normal, light).abs()
+        };
         let inverted = solid.inverted[facet.cell as usize];
         let colour = match field {
             _ if inverted => colour::INVERTED,

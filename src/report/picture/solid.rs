@@ -37,12 +37,27 @@ impl Solid {
             points: content.points.clone(),
             ..Solid::default()
         };
-        if let Some(source) = content.point_data.iter().find(|field| field.name == SOURCE && field.components == 3) {
-            solid.source = Some(source.values.chunks_exact(3).map(|point| [point[0], point[1], point[2]]).collect());
+        if let Some(source) = content
+            .point_data
+            .iter()
+            .find(|field| field.name == SOURCE && field.components == 3)
+        {
+            solid.source = Some(
+                source
+                    .values
+                    .chunks_exact(3)
+                    .map(|point| [point[0], point[1], point[2]])
+                    .collect(),
+            );
         }
         let cells = content.cells();
         let count = |kind| cells.count_of(kind);
-        let volume = [CellKind::Tetrahedron, CellKind::Hexahedron, CellKind::Prism, CellKind::Pyramid];
+        let volume = [
+            CellKind::Tetrahedron,
+            CellKind::Hexahedron,
+            CellKind::Prism,
+            CellKind::Pyramid,
+        ];
         let surface = count(CellKind::Triangle) + count(CellKind::Quad);
         let mut owners: Vec<usize> = Vec::new();
         if volume.iter().any(|kind| count(*kind) > 0) {
@@ -90,15 +105,25 @@ impl Solid {
 
     /// The number of simplices.
     pub fn count(&self) -> usize {
-        if self.is_volume() { self.tetrahedra.len() } else { self.triangles.len() }
+        if self.is_volume() {
+            self.tetrahedra.len()
+        } else {
+            self.triangles.len()
+        }
     }
 }
 
 type Faces = &'static [&'static [usize]];
 
 const TETRAHEDRON: Faces = &[];
-const HEXAHEDRON: Faces =
-    &[&[0, 1, 5, 4], &[1, 2, 6, 5], &[2, 3, 7, 6], &[3, 0, 4, 7], &[0, 3, 2, 1], &[4, 5, 6, 7]];
+const HEXAHEDRON: Faces = &[
+    &[0, 1, 5, 4],
+    &[1, 2, 6, 5],
+    &[2, 3, 7, 6],
+    &[3, 0, 4, 7],
+    &[0, 3, 2, 1],
+    &[4, 5, 6, 7],
+];
 const PRISM: Faces = &[&[0, 1, 2], &[3, 4, 5], &[0, 1, 4, 3], &[1, 2, 5, 4], &[2, 0, 3, 5]];
 const PYRAMID: Faces = &[&[0, 1, 2, 3], &[0, 1, 4], &[1, 2, 4], &[2, 3, 4], &[3, 0, 4]];
 

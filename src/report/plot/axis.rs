@@ -33,9 +33,15 @@ pub struct Tick {
 impl Axis {
     /// An axis that shows all these values with some room, or with none at its low end when `flush`.
     pub fn new(label: String, kind: Kind, values: impl Iterator<Item = f64>, flush: bool) -> Axis {
-        let (mut low, mut high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
+        let (mut low, mut high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
+            (low.min(value), high.max(value))
+        });
         if low > high {
-            (low, high) = if kind == Kind::Logarithmic { (1.0, 10.0) } else { (0.0, 1.0) };
+            (low, high) = if kind == Kind::Logarithmic {
+                (1.0, 10.0)
+            } else {
+                (0.0, 1.0)
+            };
         }
         match &kind {
             Kind::Category(names) => {
@@ -72,7 +78,11 @@ impl Axis {
                 }
             }
             Kind::Logarithmic => {
-                let room = if low == high { 2f64.ln() } else { 0.05 * (high / low).ln() };
+                let room = if low == high {
+                    2f64.ln()
+                } else {
+                    0.05 * (high / low).ln()
+                };
                 low = (low.ln() - if flush { 0.0 } else { room }).exp();
                 high = (high.ln() + room).exp();
                 Axis {
@@ -106,7 +116,11 @@ fn tick(value: f64, label: String) -> Tick {
 fn linear_ticks(low: f64, high: f64) -> Vec<Tick> {
     let raw = (high - low) / 6.0;
     let power = 10f64.powi(raw.log10().floor() as i32);
-    let step = [1.0, 2.0, 5.0, 10.0].map(|factor| factor * power).into_iter().find(|step| *step >= raw).unwrap_or(raw);
+    let step = [1.0, 2.0, 5.0, 10.0]
+        .map(|factor| factor * power)
+        .into_iter()
+        .find(|step| *step >= raw)
+        .unwrap_or(raw);
     let largest = low.abs().max(high.abs());
     let decimals = (-step.log10().floor()).max(0.0) as usize;
     let first = (low / step - 1e-9).ceil() as i64;
@@ -139,15 +153,21 @@ fn logarithmic_ticks(low: f64, high: f64) -> Vec<Tick> {
             let value = power(exponent);
             if inside(value) {
                 let label = (exponent.rem_euclid(every) == 0).then(|| {
-                    if plain { round(value, 1).plain() } else { format!("10{}", superscript(exponent)) }
+                    if plain {
+                        round(value, 1).plain()
+                    } else {
+                        format!("10{}", superscript(exponent))
+                    }
                 });
                 ticks.push(Tick { value, label });
             }
             if every == 1 && decades.len() <= 6 {
-                ticks.extend((2..10).map(|factor| f64::from(factor) * value).filter(|value| inside(*value)).map(|value| Tick {
-                    value,
-                    label: None,
-                }));
+                ticks.extend(
+                    (2..10)
+                        .map(|factor| f64::from(factor) * value)
+                        .filter(|value| inside(*value))
+                        .map(|value| Tick { value, label: None }),
+                );
             }
         }
         return ticks;
@@ -165,5 +185,8 @@ fn logarithmic_ticks(low: f64, high: f64) -> Vec<Tick> {
     if ticks.iter().filter(|tick| tick.label.is_some()).count() >= 2 {
         return ticks;
     }
-    linear_ticks(low, high).into_iter().filter(|tick| tick.value > 0.0).collect()
+    linear_ticks(low, high)
+        .into_iter()
+        .filter(|tick| tick.value > 0.0)
+        .collect()
 }

@@ -101,7 +101,24 @@ fn font(size: u32) -> FontDesc<'static> {
 }
 
 fn text_style(role: Role, size: u32, horizontal: HPos, vertical: VPos) -> TextStyle<'static> {
-    TextStyle::from(font(size)).color(&role.rgb()).pos(Pos::new(horizontal, vertical))
+    style_of(font(size), role, horizontal, vertical)
+}
+
+/// Text that reads upwards.
+fn upright_style(role: Role, size: u32, horizontal: HPos, vertical: VPos) -> TextStyle<'static> {
+    style_of(
+        font(size).transform(FontTransform::Rotate270),
+        role,
+        horizontal,
+        vertical,
+    )
+}
+
+fn style_of(font: FontDesc<'static>, role: Role, horizontal: HPos, vertical: VPos) -> TextStyle<'static> {
+    let mut style = TextStyle::from(font);
+    style.color = role.rgb().to_backend_color();
+    style.pos = Pos::new(horizontal, vertical);
+    style
 }
 
 /// Width of a text in canvas units.
@@ -142,8 +159,14 @@ pub fn height(chart: &Chart) -> u32 {
 }
 
 fn upright_names(chart: &Chart) -> bool {
-    let Kind::Category(names) = &chart.x.kind else { return false };
-    let widest = names.iter().map(|name| text_width(&short(name), TEXT)).max().unwrap_or(0);
+    let Kind::Category(names) = &chart.x.kind else {
+        return false;
+    };
+    let widest = names
+        .iter()
+        .map(|name| text_width(&short(name), TEXT))
+        .max()
+        .unwrap_or(0);
     widest + 30 > 2200 / names.len().max(1) as i32
 }
 
@@ -151,9 +174,18 @@ fn layout(chart: &Chart) -> Layout {
     let label = |tick: &super::axis::Tick| tick.label.as_ref().map_or(0, |text| text_width(text, TEXT));
     let y_labels = chart.y.ticks.iter().map(label).max().unwrap_or(0);
     let named = chart.series.len() > 1 || chart.series.first().is_some_and(|one| !one.name.is_empty());
-    let names = chart.series.iter().map(|one| text_width(&short(&one.name), TEXT)).max().unwrap_or(0);
+    let names = chart
+        .series
+        .iter()
+        .map(|one| text_width(&short(&one.name), TEXT))
+        .max()
+        .unwrap_or(0);
     let upright_names = upright_names(chart);
-    let x_labels = if upright_names { chart.x.ticks.iter().map(label).max().unwrap_or(0).min(900) } else { TEXT as i32 };
+    let x_labels = if upright_names {
+        chart.x.ticks.iter().map(label).max().unwrap_or(0).min(900)
+    } else {
+        TEXT as i32
+    };
     Layout {
         left: 130 + y_labels + 40,
         right: WIDTH as i32 - if named { names + 260 } else { 60 },
@@ -182,14 +214,22 @@ impl<B: DrawingBackend> Pen<'_, B> {
     }
 
     fn text(&self, text: &str, at: (i32, i32), style: TextStyle<'static>) -> Drawn<B> {
-        self.area.draw(&Text::new(text.to_string(), at, style))
+        // The SVG is read line by line.
+        let text: String = text
+            .chars()
+            .map(|character| if character.is_control() { ' ' } else { character })
+            .collect();
+        self.area.draw(&Text::new(text, at, style))
     }
 
     fn chart(&self, chart: &Chart) -> Drawn<B> {
         let layout = layout(chart);
         self.frame(chart, &layout)?;
-        let x = |value: f64| layout.left + (chart.x.position(value) * f64::from(layout.right - layout.left)).round() as i32;
-        let y = |value: f64| layout.bottom - (chart.y.position(value) * f64::from(layout.bottom - layout.top)).round() as i32;
+        let x =
+            |value: f64| layout.left + (chart.x.position(value) * f64::from(layout.right - layout.left)).round() as i32;
+        let y = |value: f64| {
+            layout.bottom - (chart.y.position(value) * f64::from(layout.bottom - layout.top)).round() as i32
+        };
         let mut ends = Vec::new();
         for (index, one) in chart.series.iter().enumerate() {
             // Dots of several series over one named value stand side by side.
@@ -215,8 +255,16 @@ impl<B: DrawingBackend> Pen<'_, B> {
                     self.line(vec![(place.0, y(0.0)), *place], role.stroke(9))?;
                 }
             }
-            for phase in one.phases.iter().filter(|phase| (chart.x.low..=chart.x.high).contains(phase)) {
-                if let Some(point) = one.points.iter().min_by(|a, b| (a.x - phase).abs().total_cmp(&(b.x - phase).abs())) {
+            for phase in one
+                .phases
+                .iter()
+                .filter(|phase| (chart.x.low..=chart.x.high).contains(phase))
+            {
+                if let Some(point) = one
+                    .points
+                    .iter()
+                    .min_by(|a, b| (a.x - phase).abs().total_cmp(&(b.x - phase).abs()))
+                {
                     let (across, along) = at(point);
                     self.line(vec![(across, along - 46), (across, along + 46)], role.stroke(7))?;
                 }
@@ -247,7 +295,11 @@ impl<B: DrawingBackend> Pen<'_, B> {
                 Some(label) => {
                     self.line(vec![(layout.left, y), (layout.right, y)], grid)?;
                     self.line(vec![(layout.left - 22, y), (layout.left, y)], mark)?;
-                    self.text(label, (layout.left - 36, y), text_style(Role::Muted, TEXT, HPos::Right, VPos::Center))?;
+                    self.text(
+                        label,
+                        (layout.left - 36, y),
+                        text_style(Role::Muted, TEXT, HPos::Right, VPos::Center),
+                    )?;
                 }
                 None => self.line(vec![(layout.left - 12, y), (layout.left, y)], mark)?,
             }
@@ -266,24 +318,45 @@ impl<B: DrawingBackend> Pen<'_, B> {
                     }
                     self.line(vec![(x, layout.bottom), (x, layout.bottom + 22)], mark)?;
                     if layout.upright_names {
-                        let style = TextStyle::from(font(TEXT).transform(FontTransform::Rotate270)).color(&Role::Muted.rgb());
                         let at = (x, layout.bottom + 36);
-                        self.text(&short(label), at, style.pos(Pos::new(HPos::Right, VPos::Center)))?;
+                        self.text(
+                            &short(label),
+                            at,
+                            upright_style(Role::Muted, TEXT, HPos::Right, VPos::Center),
+                        )?;
                     } else {
                         let at = (x, layout.bottom + 34);
-                        self.text(&short(label), at, text_style(Role::Muted, TEXT, HPos::Center, VPos::Top))?;
+                        self.text(
+                            &short(label),
+                            at,
+                            text_style(Role::Muted, TEXT, HPos::Center, VPos::Top),
+                        )?;
                     }
                 }
                 None => self.line(vec![(x, layout.bottom), (x, layout.bottom + 12)], mark)?,
             }
         }
-        self.line(vec![(layout.left, layout.top), (layout.left, layout.bottom), (layout.right, layout.bottom)], mark)?;
+        self.line(
+            vec![
+                (layout.left, layout.top),
+                (layout.left, layout.bottom),
+                (layout.right, layout.bottom),
+            ],
+            mark,
+        )?;
         let middle = (layout.left + layout.right) / 2;
         let foot = height(chart) as i32 - 24;
-        self.text(&chart.x.label, (middle, foot), text_style(Role::Ink, TEXT, HPos::Center, VPos::Bottom))?;
-        let style = TextStyle::from(font(TEXT).transform(FontTransform::Rotate270)).color(&Role::Ink.rgb());
+        self.text(
+            &chart.x.label,
+            (middle, foot),
+            text_style(Role::Ink, TEXT, HPos::Center, VPos::Bottom),
+        )?;
         let at = (28, (layout.top + layout.bottom) / 2);
-        self.text(&chart.y.label, at, style.pos(Pos::new(HPos::Center, VPos::Top)))
+        self.text(
+            &chart.y.label,
+            at,
+            upright_style(Role::Ink, TEXT, HPos::Center, VPos::Top),
+        )
     }
 
     /// Names beside the ends of their lines, moved apart where they would overlap, each with its dashes and marker.
@@ -361,7 +434,12 @@ impl<B: DrawingBackend> Pen<'_, B> {
     }
 
     fn marker(&self, index: usize, (x, y): (i32, i32), role: Role) -> Drawn<B> {
-        let polygon = |corners: &[(i32, i32)]| Polygon::new(corners.iter().map(|(dx, dy)| (x + dx, y + dy)).collect::<Vec<_>>(), role.fill());
+        let polygon = |corners: &[(i32, i32)]| {
+            Polygon::new(
+                corners.iter().map(|(dx, dy)| (x + dx, y + dy)).collect::<Vec<_>>(),
+                role.fill(),
+            )
+        };
         match index % 8 {
             0 => self.area.draw(&Circle::new((x, y), 24, role.fill())),
             1 => self.area.draw(&polygon(&[(-21, -21), (21, -21), (21, 21), (-21, 21)])),
@@ -380,7 +458,10 @@ impl<B: DrawingBackend> Pen<'_, B> {
                 let ring: Vec<(i32, i32)> = (0..=16)
                     .map(|step| {
                         let angle = std::f64::consts::TAU * f64::from(step) / 16.0;
-                        (x + (23.0 * angle.cos()).round() as i32, y + (23.0 * angle.sin()).round() as i32)
+                        (
+                            x + (23.0 * angle.cos()).round() as i32,
+                            y + (23.0 * angle.sin()).round() as i32,
+                        )
                     })
                     .collect();
                 self.line(ring, role.stroke(9))
@@ -401,5 +482,10 @@ fn marked(places: &[(i32, i32)], index: usize) -> Vec<(i32, i32)> {
         return places.to_vec();
     }
     let step = places.len() / MOST;
-    places.iter().copied().skip((index * step / 3) % step).step_by(step).collect()
+    places
+        .iter()
+        .copied()
+        .skip((index * step / 3) % step)
+        .step_by(step)
+        .collect()
 }

@@ -102,10 +102,18 @@ pub fn chart(experiment: &Experiment, plot: &Plot, rows: &[Row]) -> Chart {
     };
     let y_kind = if plot.log_y { Kind::Logarithmic } else { Kind::Linear };
     let x = Axis::new(quantity_x.heading(), x_kind, all().map(|point| point.x), is_trace);
-    let y = Axis::new(quantity_y.heading(), y_kind, all().flat_map(|point| [point.low, point.high]), false);
+    let y = Axis::new(
+        quantity_y.heading(),
+        y_kind,
+        all().flat_map(|point| [point.low, point.high]),
+        false,
+    );
     Chart {
         name: plot.name.clone(),
-        title: plot.title.clone().unwrap_or_else(|| format!("{} against {}", plot.y.replace('_', " "), plot.x.replace('_', " "))),
+        title: plot
+            .title
+            .clone()
+            .unwrap_or_else(|| format!("{} against {}", plot.y.replace('_', " "), plot.x.replace('_', " "))),
         x,
         y,
         series,
@@ -118,13 +126,20 @@ impl Chart {
     pub fn alternative(&self) -> String {
         let mut text = format!("{}. {} against {}.", self.title, self.y.label, self.x.label);
         for one in &self.series {
-            let (Some(first), Some(last)) = (one.points.first(), one.points.last()) else { continue };
+            let (Some(first), Some(last)) = (one.points.first(), one.points.last()) else {
+                continue;
+            };
             let name = if one.name.is_empty() { "all jobs" } else { &one.name };
             let plain = |value: f64| super::number::round(value, 3).unicode();
             if one.points.len() == 1 {
                 text.push_str(&format!(" {name}: {}.", plain(first.y)));
             } else {
-                text.push_str(&format!(" {name}: from {} to {} over {} points.", plain(first.y), plain(last.y), one.points.len()));
+                text.push_str(&format!(
+                    " {name}: from {} to {} over {} points.",
+                    plain(first.y),
+                    plain(last.y),
+                    one.points.len()
+                ));
             }
         }
         text
@@ -143,15 +158,26 @@ fn traces(plot: &Plot, chosen: &[&Row], notes: &mut Vec<String>) -> Vec<Series> 
         };
         // One line a job: where the series' axes do not tell jobs apart, their names do.
         let shared = labels.iter().filter(|other| **other == labels[index]).count() > 1;
-        let name = if shared || labels[index].is_empty() { row.name.clone() } else { labels[index].clone() };
+        let name = if shared || labels[index].is_empty() {
+            row.name.clone()
+        } else {
+            labels[index].clone()
+        };
         let phase = PHASES.iter().find_map(|name| traces.get(*name));
         let phases = phase.map_or_else(Vec::new, |phase| {
-            let changes = phase.windows(2).zip(x.iter().skip(1)).filter(|(pair, _)| pair[0] != pair[1]);
+            let changes = phase
+                .windows(2)
+                .zip(x.iter().skip(1))
+                .filter(|(pair, _)| pair[0] != pair[1]);
             changes.map(|(_, &x)| x).filter(|x| x.is_finite()).collect()
         });
         series.push(Series {
             name,
-            points: x.iter().zip(y).map(|(&x, &y)| Point { x, y, low: y, high: y }).collect(),
+            points: x
+                .iter()
+                .zip(y)
+                .map(|(&x, &y)| Point { x, y, low: y, high: y })
+                .collect(),
             joined: true,
             phases,
         });
@@ -166,7 +192,10 @@ fn traces(plot: &Plot, chosen: &[&Row], notes: &mut Vec<String>) -> Vec<Series> 
 }
 
 fn figures(plot: &Plot, chosen: &[&Row], categories: &mut Vec<String>, notes: &mut Vec<String>) -> Vec<Series> {
-    let numeric = chosen.iter().filter(|row| row.done()).all(|row| row.figure(&plot.x).is_some());
+    let numeric = chosen
+        .iter()
+        .filter(|row| row.done())
+        .all(|row| row.figure(&plot.x).is_some());
     let mut series: Vec<(Series, Vec<Vec<f64>>)> = Vec::new();
     let mut without = Vec::new();
     for row in chosen {
@@ -219,7 +248,9 @@ fn figures(plot: &Plot, chosen: &[&Row], categories: &mut Vec<String>, notes: &m
         one.points.sort_by(|left, right| left.x.total_cmp(&right.x));
     }
     if several {
-        notes.push("A point that stands for several jobs is their mean; its bar goes from the lowest to the highest.".into());
+        notes.push(
+            "A point that stands for several jobs is their mean; its bar goes from the lowest to the highest.".into(),
+        );
     }
     if !without.is_empty() {
         notes.push(format!("Without a figure: {}.", without.join(", ")));
@@ -237,7 +268,9 @@ fn thin(points: &mut Vec<Point>) {
     let mut kept = Vec::with_capacity(MOST + 2);
     for chunk in points.chunks(stretch) {
         let by_y = |left: &&Point, right: &&Point| left.y.total_cmp(&right.y);
-        let (Some(low), Some(high)) = (chunk.iter().min_by(by_y), chunk.iter().max_by(by_y)) else { continue };
+        let (Some(low), Some(high)) = (chunk.iter().min_by(by_y), chunk.iter().max_by(by_y)) else {
+            continue;
+        };
         let (first, second) = if low.x <= high.x { (low, high) } else { (high, low) };
         kept.push(*first);
         if first != second {

@@ -9,7 +9,9 @@ use std::fmt::Write;
 
 /// Rules for all plots, once a page. On dark paper the series' colours are lighter.
 pub fn style() -> String {
-    let dark = ["#4fa8e0", "#f08046", "#2fc79a", "#dd94bd", "#eceff2", "#f0b429", "#7cc8f2", "#d8c62a"];
+    let dark = [
+        "#4fa8e0", "#f08046", "#2fc79a", "#dd94bd", "#eceff2", "#f0b429", "#7cc8f2", "#d8c62a",
+    ];
     let mut light_rules = String::new();
     let mut dark_rules = String::new();
     for (index, (red, green, blue)) in SERIES.into_iter().enumerate() {
@@ -23,10 +25,16 @@ pub fn style() -> String {
          .plot path,.plot polygon{{stroke-linejoin:round;stroke-linecap:butt}}"
     );
     for (class, variable) in [("i", "pi"), ("m", "pm"), ("g", "pg")] {
-        let _ = write!(text, ".plot .s{class}{{stroke:var(--{variable});fill:none}}.plot .f{class}{{fill:var(--{variable})}}");
+        let _ = write!(
+            text,
+            ".plot .s{class}{{stroke:var(--{variable});fill:none}}.plot .f{class}{{fill:var(--{variable})}}"
+        );
     }
     for index in 0..SERIES.len() {
-        let _ = write!(text, ".plot .s{index}{{stroke:var(--c{index});fill:none}}.plot .f{index}{{fill:var(--c{index})}}");
+        let _ = write!(
+            text,
+            ".plot .s{index}{{stroke:var(--c{index});fill:none}}.plot .f{index}{{fill:var(--c{index})}}"
+        );
     }
     text
 }
@@ -35,7 +43,9 @@ pub fn style() -> String {
 pub fn standalone(chart: &Chart) -> Result<String, ReportError> {
     let (width, height) = (draw::WIDTH, draw::height(chart));
     let style = style();
-    let style = format!("<style>{style}.paper{{fill:#fff}}@media(prefers-color-scheme:dark){{.paper{{fill:#16191d}}}}@media print{{.paper{{fill:#fff}}}}</style><rect class=\"paper\" width=\"{width}\" height=\"{height}\"/>");
+    let style = format!(
+        "<style>{style}.paper{{fill:#fff}}@media(prefers-color-scheme:dark){{.paper{{fill:#16191d}}}}@media print{{.paper{{fill:#fff}}}}</style><rect class=\"paper\" width=\"{width}\" height=\"{height}\"/>"
+    );
     // A quarter of the canvas is the natural size on a screen.
     let size = format!(" width=\"{}\" height=\"{}\"", width / 4, height / 4);
     compose(chart, &size, &style)
@@ -67,7 +77,7 @@ fn compose(chart: &Chart, size: &str, head: &str) -> Result<String, ReportError>
 /// Reads plotters' elements, one a line, and writes fewer and shorter ones: polylines of one style become one path.
 fn rewrite(raw: &str, text: &mut String) -> Result<(), String> {
     let mut open_path: Option<(String, String)> = None;
-    let mut close = |open_path: &mut Option<(String, String)>, text: &mut String| {
+    let close = |open_path: &mut Option<(String, String)>, text: &mut String| {
         if let Some((style, data)) = open_path.take() {
             let _ = write!(text, "<path {style} d=\"{data}\"/>");
         }
@@ -79,7 +89,11 @@ fn rewrite(raw: &str, text: &mut String) -> Result<(), String> {
         match element {
             "svg" | "/svg" => {}
             "polyline" | "line" => {
-                let style = format!("class=\"s{}\" stroke-width=\"{}\"", class(get("stroke")?)?, get("stroke-width")?);
+                let style = format!(
+                    "class=\"s{}\" stroke-width=\"{}\"",
+                    class(get("stroke")?)?,
+                    get("stroke-width")?
+                );
                 let data = if element == "line" {
                     format!("M{} {} {} {}", get("x1")?, get("y1")?, get("x2")?, get("y2")?)
                 } else {
@@ -95,7 +109,12 @@ fn rewrite(raw: &str, text: &mut String) -> Result<(), String> {
             }
             "polygon" => {
                 close(&mut open_path, text);
-                let _ = write!(text, "<polygon class=\"f{}\" points=\"{}\"/>", class(get("fill")?)?, get("points")?.trim_end());
+                let _ = write!(
+                    text,
+                    "<polygon class=\"f{}\" points=\"{}\"/>",
+                    class(get("fill")?)?,
+                    get("points")?.trim_end()
+                );
             }
             "circle" => {
                 close(&mut open_path, text);
@@ -110,7 +129,8 @@ fn rewrite(raw: &str, text: &mut String) -> Result<(), String> {
             }
             "text" => {
                 close(&mut open_path, text);
-                let transform = attribute(line, "transform").map_or_else(String::new, |value| format!(" transform=\"{value}\""));
+                let transform =
+                    attribute(line, "transform").map_or_else(String::new, |value| format!(" transform=\"{value}\""));
                 let _ = write!(
                     text,
                     "<text class=\"f{}\" x=\"{}\" y=\"{}\" dy=\"{}\" text-anchor=\"{}\" font-size=\"{}\"{transform}>{}</text>",

@@ -7,13 +7,21 @@ use crate::report::number;
 /// that sums up several jobs is followed by their standard deviation and count.
 pub fn write(grid: &Grid) -> Result<Vec<u8>, csv::Error> {
     let spread: Vec<bool> = (0..grid.head.len())
-        .map(|column| grid.body.iter().any(|line| matches!(line[column].content, Content::Figure { spread: Some(_), .. })))
+        .map(|column| {
+            grid.body
+                .iter()
+                .any(|line| matches!(line[column].content, Content::Figure { spread: Some(_), .. }))
+        })
         .collect();
     let mut writer = csv::Writer::from_writer(Vec::new());
     let mut head: Vec<String> = Vec::new();
     let mut figure = String::new();
     for (column, spread) in grid.head.iter().zip(&spread) {
-        let unit = if column.unit.is_empty() { String::new() } else { format!(" [{}]", column.unit) };
+        let unit = if column.unit.is_empty() {
+            String::new()
+        } else {
+            format!(" [{}]", column.unit)
+        };
         match column.kind {
             Column::Axis => head.push(column.text.clone()),
             Column::Figure => {
@@ -64,5 +72,7 @@ pub fn write(grid: &Grid) -> Result<Vec<u8>, csv::Error> {
         fields.push(notes.join("; "));
         writer.write_record(&fields)?;
     }
-    writer.into_inner().map_err(|error| csv::Error::from(error.into_error()))
+    writer
+        .into_inner()
+        .map_err(|error| csv::Error::from(error.into_error()))
 }

@@ -31,12 +31,20 @@ pub fn write(grid: &Grid) -> String {
         } else {
             format!(" <span class=\"unit\">[{}]</span>", escape(&head.unit))
         };
-        let _ = write!(text, "<th scope=\"col\" class=\"{class}\"{title}>{}{unit}</th>", escape(&head.text));
+        let _ = write!(
+            text,
+            "<th scope=\"col\" class=\"{class}\"{title}>{}{unit}</th>",
+            escape(&head.text)
+        );
     }
     text.push_str("</tr></thead><tbody>");
     let mut previous: Option<&Vec<Cell>> = None;
     for line in &grid.body {
-        text.push_str(if new_group(grid, previous, line) { "<tr class=\"group\">" } else { "<tr>" });
+        text.push_str(if new_group(grid, previous, line) {
+            "<tr class=\"group\">"
+        } else {
+            "<tr>"
+        });
         for (head, cell) in grid.head.iter().zip(line) {
             text.push_str(&self::cell(grid, head.kind, cell));
         }
@@ -47,7 +55,13 @@ pub fn write(grid: &Grid) -> String {
     if !grid.notes.is_empty() {
         text.push_str("<ol class=\"notes\">");
         for (index, note) in grid.notes.iter().enumerate() {
-            let _ = write!(text, "<li id=\"note-{}-{}\">{}</li>", escape(&grid.name), index + 1, escape(note));
+            let _ = write!(
+                text,
+                "<li id=\"note-{}-{}\">{}</li>",
+                escape(&grid.name),
+                index + 1,
+                escape(note)
+            );
         }
         text.push_str("</ol>");
     }
@@ -63,7 +77,9 @@ pub fn write(grid: &Grid) -> String {
 /// Whether the first of several row axes changes here, which a rule shows.
 fn new_group(grid: &Grid, previous: Option<&Vec<Cell>>, line: &[Cell]) -> bool {
     let axes = grid.head.iter().filter(|head| head.kind == Column::Axis).count();
-    let (Some(previous), true) = (previous, axes > 1) else { return false };
+    let (Some(previous), true) = (previous, axes > 1) else {
+        return false;
+    };
     match (&previous[0].content, &line[0].content) {
         (Content::Text(left), Content::Text(right)) => left != right,
         _ => false,
@@ -72,7 +88,10 @@ fn new_group(grid: &Grid, previous: Option<&Vec<Cell>>, line: &[Cell]) -> bool {
 
 fn cell(grid: &Grid, column: Column, cell: &Cell) -> String {
     let mark = cell.mark.map_or_else(String::new, |mark| {
-        format!("<sup><a href=\"#note-{}-{mark}\" aria-label=\"note {mark}\">{mark}</a></sup>", escape(&grid.name))
+        format!(
+            "<sup><a href=\"#note-{}-{mark}\" aria-label=\"note {mark}\">{mark}</a></sup>",
+            escape(&grid.name)
+        )
     });
     match &cell.content {
         Content::Text(text) if column == Column::Axis => format!("<th scope=\"row\">{}</th>", escape(text)),
@@ -101,7 +120,10 @@ fn cell(grid: &Grid, column: Column, cell: &Cell) -> String {
             };
             let word = judgement.word();
             let gap = if word.is_empty() { "" } else { " " };
-            format!("<td class=\"difference {class}\">{}{gap}<span>{word}</span></td>", escape(text))
+            format!(
+                "<td class=\"difference {class}\">{}{gap}<span>{word}</span></td>",
+                escape(text)
+            )
         }
         Content::Empty => "<td></td>".into(),
     }

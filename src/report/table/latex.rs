@@ -15,7 +15,11 @@ pub fn write(grid: &Grid) -> String {
         .head
         .iter()
         .map(|head| {
-            let unit = if head.unit.is_empty() { String::new() } else { format!(" [{}]", escape(&head.unit)) };
+            let unit = if head.unit.is_empty() {
+                String::new()
+            } else {
+                format!(" [{}]", escape(&head.unit))
+            };
             format!("{}{unit}", escape(&head.text))
         })
         .collect();

@@ -8,12 +8,20 @@ use std::fmt::Write;
 pub fn write(grid: &Grid) -> String {
     let mut text = format!("### {}\n\n|", escape(&grid.title));
     for head in &grid.head {
-        let unit = if head.unit.is_empty() { String::new() } else { format!(" [{}]", head.unit) };
+        let unit = if head.unit.is_empty() {
+            String::new()
+        } else {
+            format!(" [{}]", head.unit)
+        };
         let _ = write!(text, " {}{} |", escape(&head.text), escape(&unit));
     }
     text.push_str("\n|");
     for head in &grid.head {
-        text.push_str(if head.kind == Column::Axis { " :--- |" } else { " ---: |" });
+        text.push_str(if head.kind == Column::Axis {
+            " :--- |"
+        } else {
+            " ---: |"
+        });
     }
     text.push('\n');
     for line in &grid.body {

@@ -140,10 +140,15 @@ struct Line<'a> {
 /// The table that the file's `[[table]]` asks for.
 pub fn build(experiment: &Experiment, table: &Table, rows: &[Row]) -> Grid {
     let lines = lines(table, rows);
-    let quantities: Vec<Quantity> = table.columns.iter().map(|name| Quantity::find(experiment, name)).collect();
+    let quantities: Vec<Quantity> = table
+        .columns
+        .iter()
+        .map(|name| Quantity::find(experiment, name))
+        .collect();
     let printed: Vec<Vec<Option<Printed>>> = lines.iter().map(|line| printed_figures(table, line)).collect();
-    let has_printed: Vec<bool> =
-        (0..quantities.len()).map(|column| printed.iter().any(|line| line[column].is_some())).collect();
+    let has_printed: Vec<bool> = (0..quantities.len())
+        .map(|column| printed.iter().any(|line| line[column].is_some()))
+        .collect();
 
     let mut notes = Notes::default();
     let mut body = Vec::new();
@@ -223,8 +228,16 @@ fn head(table: &Table, quantities: &[Quantity], has_printed: &[bool]) -> Vec<Hea
     for (quantity, printed) in quantities.iter().zip(has_printed) {
         let column = |text: &str, kind| Head {
             text: text.into(),
-            unit: if kind == Column::Difference { String::new() } else { quantity.unit.clone() },
-            definition: if kind == Column::Figure { quantity.definition.clone() } else { String::new() },
+            unit: if kind == Column::Difference {
+                String::new()
+            } else {
+                quantity.unit.clone()
+            },
+            definition: if kind == Column::Figure {
+                quantity.definition.clone()
+            } else {
+                String::new()
+            },
             kind,
         };
         head.push(column(&quantity.name, Column::Figure));
@@ -237,7 +250,11 @@ fn head(table: &Table, quantities: &[Quantity], has_printed: &[bool]) -> Vec<Hea
 }
 
 fn figures(line: &Line, name: &str) -> Vec<f64> {
-    line.jobs.iter().filter_map(|job| job.figure(name)).filter(|value| !value.is_nan()).collect()
+    line.jobs
+        .iter()
+        .filter_map(|job| job.figure(name))
+        .filter(|value| !value.is_nan())
+        .collect()
 }
 
 fn figure(line: &Line, quantity: &Quantity, notes: &mut Notes) -> Cell {
@@ -248,7 +265,11 @@ fn figure(line: &Line, quantity: &Quantity, notes: &mut Notes) -> Cell {
         match troubled {
             Some(job) => Content::Absent(word(job).into()),
             None => Content::Absent(
-                if line.jobs.iter().any(|job| job.record.result.metrics.contains_key(&quantity.name)) {
+                if line
+                    .jobs
+                    .iter()
+                    .any(|job| job.record.result.metrics.contains_key(&quantity.name))
+                {
                     "undefined"
                 } else {
                     "absent"
@@ -285,7 +306,11 @@ pub fn word(row: &Row) -> &str {
 
 fn note(job: &Row, jobs: usize) -> String {
     let result = &job.record.result;
-    let who = if jobs > 1 { format!("{}: ", job.name) } else { String::new() };
+    let who = if jobs > 1 {
+        format!("{}: ", job.name)
+    } else {
+        String::new()
+    };
     if result.reason.is_empty() {
         format!("{who}{}", word(job))
     } else {
@@ -320,7 +345,9 @@ fn best_figures(lines: &[Line], quantities: &[Quantity]) -> Vec<Vec<bool>> {
                 continue;
             }
             let fixed = line.axes.len().saturating_sub(1);
-            let group = line.axes[..fixed].iter().map(|value| value.map_or_else(String::new, |value| value.to_string()));
+            let group = line.axes[..fixed]
+                .iter()
+                .map(|value| value.map_or_else(String::new, |value| value.to_string()));
             groups
                 .entry(group.collect::<Vec<_>>().join("\n"))
                 .or_default()
@@ -352,7 +379,12 @@ impl Printed {
     fn half_unit(&self) -> f64 {
         let mantissa = self.text.split(['e', 'E']).next().unwrap_or("");
         let decimals = mantissa.split_once('.').map_or(0, |(_, digits)| digits.len());
-        let exponent: i32 = self.text.split(['e', 'E']).nth(1).and_then(|text| text.parse().ok()).unwrap_or(0);
+        let exponent: i32 = self
+            .text
+            .split(['e', 'E'])
+            .nth(1)
+            .and_then(|text| text.parse().ok())
+            .unwrap_or(0);
         0.5 * 10f64.powi(exponent - decimals as i32)
     }
 
@@ -381,12 +413,20 @@ impl Printed {
         let relative = difference / self.value.abs();
         let text = if !difference.is_finite() || self.value == 0.0 {
             let rounded = super::number::round(difference, 3).unicode();
-            if difference > 0.0 { format!("+{rounded}") } else { rounded }
+            if difference > 0.0 {
+                format!("+{rounded}")
+            } else {
+                rounded
+            }
         } else if relative > 1.0 {
             format!("\u{d7}{}", super::number::round(ours / self.value, 3).unicode())
         } else {
             let rounded = format!("{:+.1} %", 100.0 * relative).replace('-', "\u{2212}");
-            if matches!(rounded.as_str(), "+0.0 %" | "\u{2212}0.0 %") { "0.0 %".into() } else { rounded }
+            if matches!(rounded.as_str(), "+0.0 %" | "\u{2212}0.0 %") {
+                "0.0 %".into()
+            } else {
+                rounded
+            }
         };
         Content::Difference { text, judgement }
     }
@@ -424,14 +464,12 @@ fn legend(table: &Table, quantities: &[Quantity], lines: &[Line], any_best: bool
         legend.push("Figures to four significant digits; jobs.csv holds them unrounded.".into());
     }
     if any_best {
-        legend.push(
-            match table.rows.as_slice() {
-                [] | [_] => "Bold: the best of a column.".to_string(),
-                [fixed @ .., last] => {
-                    format!("Bold: the best {last} of a column at equal {}.", fixed.join(" and "))
-                }
-            },
-        );
+        legend.push(match table.rows.as_slice() {
+            [] | [_] => "Bold: the best of a column.".to_string(),
+            [fixed @ .., last] => {
+                format!("Bold: the best {last} of a column at equal {}.", fixed.join(" and "))
+            }
+        });
     }
     if lines.iter().any(|line| line.jobs.len() > 1) {
         legend.push("A \u{b1} B (n): mean and sample standard deviation of n jobs.".into());

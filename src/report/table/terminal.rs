@@ -8,7 +8,7 @@ use std::fmt::Write;
 /// The table with its notes; best figures carry a star.
 pub fn write(grid: &Grid, width: Option<u16>) -> String {
     let mut table = Table::new();
-    table.load_preset(presets::NOTHING);
+    table.load_style(presets::NOTHING);
     if let Some(width) = width {
         table.set_content_arrangement(ContentArrangement::Dynamic);
         table.set_width(width);
@@ -66,5 +66,7 @@ fn cell(cell: &Cell) -> String {
 
 /// Text without control characters, so that no name can steer the terminal.
 pub fn plain(text: &str) -> String {
-    text.chars().map(|character| if character.is_control() { ' ' } else { character }).collect()
+    text.chars()
+        .map(|character| if character.is_control() { ' ' } else { character })
+        .collect()
 }

@@ -1,3 +1,4 @@
 //! One test binary; a file a property.
 
 mod floors;
+mod formats;

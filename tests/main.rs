@@ -5,3 +5,4 @@ mod energies;
 mod kernels;
 mod mapping;
 mod sparse;
+mod formats;

@@ -1,4 +1,7 @@
 //! One test binary; a file a property.
 
 mod floors;
+mod energies;
+mod kernels;
+mod mapping;
 mod sparse;

@@ -329,8 +329,6 @@ pub struct Surface {
     pub triangles: usize,
     /// Closed curves of edges with one triangle.
     pub loops: usize,
-    /// Edges with three or more triangles.
-    pub crowded_edges: usize,
     /// Number of handles, from `V - E + F = 2 - 2 g - loops`; `None` unless the component is a manifold that can be
     /// oriented consistently as it stands.
     pub genus: Option<usize>,
@@ -348,14 +346,16 @@ impl Surface {
 pub struct SurfaceTopology {
     /// One entry a component, in the order of the components' smallest vertices.
     pub components: Vec<Surface>,
-    /// Edges with three or more triangles.
+    /// Edges with three or more triangles, and the first triangle that has one.
     pub crowded_edges: usize,
+    pub first_crowded: u32,
     /// Vertices where parts touch in a point, ascending.
     pub pinched: Vec<u32>,
     /// Pairs of neighbouring triangles that run along their edge in the same direction, as the first of the pair.
     pub disoriented: Vec<u32>,
-    /// Edges with one triangle.
+    /// Edges with one triangle, and their vertices.
     pub boundary_edges: usize,
+    pub boundary_vertices: usize,
 }
 
 /// Analyses triangles given by vertices; degenerate or repeated triangles spoil the counts and should be gone.
@@ -366,6 +366,7 @@ pub fn surface_topology(triangles: &[[u32; 3]], vertices: usize) -> SurfaceTopol
         components: vec![Surface::default(); parts.count],
         pinched: pinched_vertices(triangles, vertices, &facets),
         crowded_edges: facets.crowded,
+        first_crowded: facets.first_crowded,
         ..SurfaceTopology::default()
     };
     let mut spoiled = vec![false; parts.count];
@@ -380,7 +381,6 @@ pub fn surface_topology(triangles: &[[u32; 3]], vertices: usize) -> SurfaceTopol
     }
     let mut rims = DisjointSets::new(vertices);
     let mut on_rim = vec![false; vertices];
-    let mut crowded: Vec<[u32; 2]> = Vec::new();
     for (index, (triangle, neighbours)) in triangles.iter().zip(&facets.neighbours).enumerate() {
         let part = parts.of_vertex[triangle[0] as usize] as usize;
         found.components[part].triangles += 1;
@@ -393,10 +393,7 @@ pub fn surface_topology(triangles: &[[u32; 3]], vertices: usize) -> SurfaceTopol
                     on_rim[to as usize] = true;
                     rims.join(from, to);
                 }
-                CROWDED => {
-                    crowded.push([from.min(to), from.max(to)]);
-                    spoiled[part] = true;
-                }
+                CROWDED => spoiled[part] = true,
                 other if (other as usize) > index => {
                     let other = &triangles[other as usize];
                     if (0..3).any(|i| other[i] == from && other[(i + 1) % 3] == to) {
@@ -408,11 +405,7 @@ pub fn surface_topology(triangles: &[[u32; 3]], vertices: usize) -> SurfaceTopol
             }
         }
     }
-    crowded.sort_unstable();
-    crowded.dedup();
-    for [low, _] in crowded {
-        found.components[parts.of_vertex[low as usize] as usize].crowded_edges += 1;
-    }
+    found.boundary_vertices = on_rim.iter().filter(|&&on| on).count();
     for vertex in 0..vertices {
         if on_rim[vertex] && rims.root(vertex as u32) as usize == vertex {
             found.components[parts.of_vertex[vertex] as usize].loops += 1;

@@ -1,2 +1,4 @@
-#[test]
-fn t() {}
+//! The properties that vargeo promises, a file each.
+
+mod runner;
+mod store;

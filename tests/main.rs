@@ -1,4 +1,5 @@
-//! The properties that vargeo promises, a file each.
+//! One test binary; a file a property.
 
+mod floors;
 mod runner;
 mod store;

@@ -1,5 +1,9 @@
 //! One test binary; a file a property.
 
 mod floors;
+mod energies;
+mod kernels;
+mod mapping;
 mod runner;
+mod sparse;
 mod store;

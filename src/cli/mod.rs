@@ -2,6 +2,7 @@
 
 mod job;
 mod list;
+mod mesh;
 mod progress;
 mod store;
 
@@ -39,6 +40,7 @@ const EXIT_CODES: &str = "Exit codes: 0 all well, 1 an expectation was not met, 
 #[derive(Subcommand)]
 enum Command {
     List(list::Arguments),
+    Mesh(mesh::Arguments),
     Store(store::Arguments),
     #[command(hide = true)]
     Job(job::Arguments),
@@ -60,6 +62,7 @@ pub fn main() -> ExitCode {
     };
     let exit = match arguments.command {
         Command::List(arguments) => list::execute(arguments),
+        Command::Mesh(arguments) => mesh::execute(arguments),
         Command::Store(arguments) => store::execute(arguments),
         Command::Job(arguments) => job::execute(arguments),
     };

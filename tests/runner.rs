@@ -8,9 +8,9 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 use vargeo::experiment::file::{Experiment, Limits, Timing};
-use vargeo::experiment::job::{Job, JobPart, Key};
+use vargeo::experiment::job::{Job, JobPart, Key, sha256};
 use vargeo::experiment::plan::{Plan, PlannedJob};
-use vargeo::experiment::record::{Record, Status};
+use vargeo::experiment::record::{RECORD_SCHEMA, Record, Status};
 use vargeo::method::model::{ModelKind, Part};
 use vargeo::method::setting::Field;
 use vargeo::method::{Failure, Inputs, Method, Outcome};
@@ -20,7 +20,7 @@ use vargeo::run::event::{Event, Listener, Nobody};
 use vargeo::run::execute::{Bounds, Ending, execute};
 use vargeo::run::interrupt::Interrupt;
 use vargeo::run::protocol::{Effort, Message};
-use vargeo::run::store::{Lookup, MESH, Store, sha256};
+use vargeo::run::store::{Lookup, MESH, Store};
 use vargeo::run::{Options, Program, Run, run_plan};
 
 /// A method whose settings say what goes well or wrong.
@@ -165,7 +165,7 @@ fn shell(script: &str, arguments: &[PathBuf]) -> Program {
 fn plan(settings: &[Value], limits: Limits, timing: Timing) -> Plan {
     let jobs = settings.iter().enumerate().map(|(number, settings)| {
         let job = Job {
-            record_schema: 1,
+            record_schema: RECORD_SCHEMA,
             method: "behaving".into(),
             method_version: 1,
             model: BTreeMap::new(),
@@ -198,7 +198,7 @@ fn plan(settings: &[Value], limits: Limits, timing: Timing) -> Plan {
 }
 
 fn planned(name: &str, job: Job, inputs: BTreeMap<String, PathBuf>) -> PlannedJob {
-    let key = Key(sha256(&serde_json::to_vec(&job).unwrap()));
+    let key = Key::of(&job);
     PlannedJob {
         name: name.into(),
         axes: Vec::new(),
@@ -225,6 +225,7 @@ fn options(folder: &Path) -> Options {
         side_by_side: Some(4),
         threads: None,
         force: false,
+        only: None,
         interrupt: Interrupt::default(),
     }
 }
@@ -336,7 +337,7 @@ fn every_end_of_a_job_is_a_record_and_the_rest_go_on() {
 
 fn job(behaviour: &str) -> Job {
     Job {
-        record_schema: 1,
+        record_schema: RECORD_SCHEMA,
         method: "behaving".into(),
         method_version: 1,
         model: BTreeMap::new(),

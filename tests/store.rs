@@ -5,21 +5,22 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::Duration;
-use vargeo::experiment::job::{Job, Key};
-use vargeo::experiment::record::{JobResult, Measurement, Record, Status};
-use vargeo::run::store::{GarbageKind, Lookup, MESH, Publication, Step, Store, sha256};
+use vargeo::experiment::job::{Job, Key, sha256};
+use vargeo::experiment::record::{JobResult, Measurement, RECORD_SCHEMA, Record, Status};
+use vargeo::run::store::{GarbageKind, Lookup, MESH, Publication, Step, Store};
 
 /// A record of a made-up job; `value` decides its result, `measured` its measurement.
 pub fn record(name: &str, value: f64, measured: i64, mesh: &[u8]) -> Record {
+    let job = Job {
+        record_schema: RECORD_SCHEMA,
+        method: "made-up".into(),
+        method_version: 1,
+        model: BTreeMap::new(),
+        settings: serde_json::json!({ "name": name }),
+    };
     Record {
-        key: Key(sha256(name.as_bytes())),
-        job: Job {
-            record_schema: 1,
-            method: "made-up".into(),
-            method_version: 1,
-            model: BTreeMap::new(),
-            settings: serde_json::json!({ "name": name }),
-        },
+        key: Key::of(&job),
+        job,
         result: JobResult {
             status: Status::Done,
             stop: "converged".into(),

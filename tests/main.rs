@@ -4,5 +4,7 @@ mod floors;
 mod energies;
 mod kernels;
 mod mapping;
+mod runner;
 mod sparse;
 mod formats;
+mod store;

@@ -1,8 +1,12 @@
 //! One test binary; a file a property.
 
+mod energies;
 mod floors;
 mod gate;
+mod kernels;
+mod mapping;
 mod page;
 mod rates;
 mod reports;
 mod sample;
+mod sparse;

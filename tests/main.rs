@@ -2,14 +2,14 @@
 
 mod energies;
 mod floors;
+mod formats;
 mod gate;
 mod kernels;
 mod mapping;
-mod runner;
 mod page;
 mod rates;
 mod reports;
+mod runner;
 mod sample;
 mod sparse;
-mod formats;
 mod store;

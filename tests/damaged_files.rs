@@ -421,3 +421,48 @@ fn damage_in_binary_data_is_named_with_its_byte() {
     );
     assert!(held < 1 << 20);
 }
+
+#[test]
+fn files_that_ask_for_more_than_they_hold_are_refused() {
+    // A thousand sections, each with data on one of many nodes.
+    let nodes: String = (1..=2000).map(|tag| format!("{tag} 0 0 0\n")).collect();
+    let data = "$NodeData\n1\n\"d\"\n0\n3\n0\n9\n1\n1 0 0 0 0 0 0 0 0 0\n$EndNodeData\n".repeat(1000);
+    let gmsh = format!(
+        "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n2000\n{nodes}$EndNodes\n$Elements\n0\n$EndElements\n{data}"
+    );
+    // Many properties of one face with many corners.
+    let properties: String = (0..2000).map(|row| format!("property char p{row}\n")).collect();
+    let ply = format!(
+        "ply\nformat ascii 1.0\nelement vertex 1\nproperty char x\nproperty char y\nproperty char z\nelement face 1\n\
+         {properties}property list int char vertex_indices\nend_header\n0 0 0\n{}20000 {}",
+        "0 ".repeat(2000),
+        "0 ".repeat(20000)
+    );
+    // Many arrays at one place.
+    let array =
+        "<DataArray type='UInt8' Name='a' NumberOfComponents='20000' format='appended' offset='0'/>\n".repeat(1000);
+    let vtu = format!(
+        "<VTKFile type='UnstructuredGrid'><Piece NumberOfPoints='0' NumberOfCells='0'/><Piece/></VTKFile>\n<!--{}-->",
+        array.len()
+    );
+    let shared = format!(
+        "<VTKFile type='UnstructuredGrid'>\n<Piece NumberOfPoints='1' NumberOfCells='0'>\n<PointData>{array}</PointData>\n<Points>\
+         <DataArray type='UInt8' NumberOfComponents='3' format='ascii'>0 0 0</DataArray></Points></Piece>\n<AppendedData encoding='raw'>_"
+    );
+    let shared = [shared.as_bytes(), &20000_u32.to_le_bytes(), &[7; 20000]].concat();
+    for (name, bytes, words) in [
+        ("sparse.msh", gmsh.as_bytes(), "cover only a few"),
+        ("fan.ply", ply.as_bytes(), "repeated too often"),
+        ("pieces.vtu", vtu.as_bytes(), "second piece"),
+        ("shared.vtu", &shared, "overlaps"),
+    ] {
+        let (outcome, held) = measured(name, bytes);
+        let error = outcome.expect_err(name);
+        assert!(error.message.contains(words), "{error}");
+        assert!(
+            held < 64 * bytes.len(),
+            "{name}: {held} bytes held for a file of {}",
+            bytes.len()
+        );
+    }
+}

@@ -1,6 +1,7 @@
 //! One test binary; a file a property.
 
 mod energies;
+mod damaged_files;
 mod floors;
 mod formats;
 mod gate;

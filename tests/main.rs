@@ -5,3 +5,5 @@ mod energies;
 mod kernels;
 mod mapping;
 mod sparse;
+mod volume_map;
+mod volume_map_feasibility;

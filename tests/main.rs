@@ -1,7 +1,7 @@
 //! One test binary; a file a property.
 
-mod energies;
 mod damaged_files;
+mod energies;
 mod floors;
 mod formats;
 mod gate;
@@ -14,3 +14,5 @@ mod runner;
 mod sample;
 mod sparse;
 mod store;
+mod volume_map;
+mod volume_map_feasibility;

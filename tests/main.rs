@@ -3,3 +3,7 @@
 mod experiment_files;
 mod floors;
 mod tiny_method;
+mod energies;
+mod kernels;
+mod mapping;
+mod sparse;

@@ -1,6 +1,10 @@
 //! The command line: one command a file, each with its arguments and its `execute`.
 
+mod job;
 mod list;
+mod mesh;
+mod progress;
+mod store;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
@@ -36,6 +40,10 @@ const EXIT_CODES: &str = "Exit codes: 0 all well, 1 an expectation was not met, 
 #[derive(Subcommand)]
 enum Command {
     List(list::Arguments),
+    Mesh(mesh::Arguments),
+    Store(store::Arguments),
+    #[command(hide = true)]
+    Job(job::Arguments),
 }
 
 /// Reads the process's arguments and runs the command that they name.
@@ -54,6 +62,9 @@ pub fn main() -> ExitCode {
     };
     let exit = match arguments.command {
         Command::List(arguments) => list::execute(arguments),
+        Command::Mesh(arguments) => mesh::execute(arguments),
+        Command::Store(arguments) => store::execute(arguments),
+        Command::Job(arguments) => job::execute(arguments),
     };
     ExitCode::from(exit as u8)
 }

@@ -119,8 +119,14 @@ d_ma = { max = 20, less_than = { order = 1, "newton.omega" = 50 }, factor = 0.5 
 [[expect]]
 where = { energy = "stretch", order = [2, 4] }
 "#
-        .replace("where = { energy = \"stretch\", order = [2, 4] }\n", "stop = \"converged\"\n")
-        .replace("where = { energy = \"stretch\" }", "where = { energy = \"stretch\", order = [2, 4] }")
+        .replace(
+            "where = { energy = \"stretch\", order = [2, 4] }\n",
+            "stop = \"converged\"\n",
+        )
+        .replace(
+            "where = { energy = \"stretch\" }",
+            "where = { energy = \"stretch\", order = [2, 4] }",
+        )
         .as_str(),
     );
     assert_eq!(experiment.name, "question");
@@ -142,13 +148,23 @@ where = { energy = "stretch", order = [2, 4] }
     assert_eq!(experiment.zips[0][1].values, [json!(50.0), json!(5.0), json!(5.0)]);
     assert_eq!(experiment.limits.seconds, Some(600.0));
     assert_eq!(experiment.limits.memory, Some(8 << 30));
-    assert_eq!((experiment.timing.exclusive, experiment.timing.repeat, experiment.timing.threads), (true, 3, None));
+    assert_eq!(
+        (
+            experiment.timing.exclusive,
+            experiment.timing.repeat,
+            experiment.timing.threads
+        ),
+        (true, 3, None)
+    );
     let published = experiment.tables[0].published.as_ref().expect("printed figures");
     assert_eq!(published.rows[0]["seconds"], json!(98));
     assert_eq!(experiment.plots[0].name, "energy-iteration");
     assert!(experiment.plots[0].log_x && experiment.plots[0].log_y);
     // Silent on series: the axes that vary, save x.
-    assert_eq!(experiment.plots[1].series, ["model", "newton.relaxation", "order", "newton.omega"]);
+    assert_eq!(
+        experiment.plots[1].series,
+        ["model", "newton.relaxation", "order", "newton.omega"]
+    );
     assert_eq!(experiment.rates[0].window, Some([0.1, 1.0]));
     assert_eq!(experiment.rates[0].expect.and_then(|bound| bound.min), Some(1.75));
     let expectation = &experiment.expectations[0];
@@ -208,7 +224,10 @@ fn every_mistake_has_its_place_and_its_mend() {
         ("[settings]\nbarrier = \"atuo\"", ""),
         ("[models.bar]\nmesh = { generate = \"barr\" }", ""),
         ("[models.bar]\nmesh = { generate = \"bar\" }", ""),
-        ("[models.bar]\nmesh = { generate = \"bar\", tetrahedra = 1, lenght = 1 }", ""),
+        (
+            "[models.bar]\nmesh = { generate = \"bar\", tetrahedra = 1, lenght = 1 }",
+            "",
+        ),
         ("[models.bar]\nmesh = \"bar\"", ""),
         ("[models.bar]\nmesh = { genrate = \"bar\" }", ""),
         ("[models.bar]\nmesh = { generate = \"ball\", file = \"x\" }", ""),
@@ -230,16 +249,34 @@ fn every_mistake_has_its_place_and_its_mend() {
         ("[settings]\norder = 1\n[vary]\norder = [1, 2]", ""),
         ("[vary]\n\"model.length\" = [1, 2]", ""),
         ("[vary]\n\"model.tetrahedra\" = [1, 0]", ""),
-        ("[models.duck]\nmesh = \"duck.mesh\"\n[vary]\n\"model.tetrahedra\" = [1, 2]", ""),
+        (
+            "[models.duck]\nmesh = \"duck.mesh\"\n[vary]\n\"model.tetrahedra\" = [1, 2]",
+            "",
+        ),
         ("[[zip]]\norder = [1, 2]\nlambda = [1, 2, 3]", ""),
         ("[[zip]]\norder = [1, 1]\nlambda = [2, 2]", ""),
-        ("[vary]\norder = [1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16]\nlambda = [1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16]\nnewton.omega = [1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16]\nschedule=[[1],[2],[3],[4],[5],[6],[7],[8],[9],[10],[11],[12],[13],[14],[15],[16],[17],[18],[19],[20],[21],[22],[23],[24],[25]]", ""),
+        (
+            "[vary]\norder = [1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16]\nlambda = [1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16]\nnewton.omega = [1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16]\nschedule=[[1],[2],[3],[4],[5],[6],[7],[8],[9],[10],[11],[12],[13],[14],[15],[16],[17],[18],[19],[20],[21],[22],[23],[24],[25]]",
+            "",
+        ),
         // Conditions.
-        ("[vary]\nenergy = [\"arap\", \"stretch\"]\n[[exclude]]\nenergy = \"hencky\"", ""),
-        ("[vary]\nenergy = [\"arap\", \"stretch\"]\n[[exclude]]\nenrgy = \"arap\"", ""),
+        (
+            "[vary]\nenergy = [\"arap\", \"stretch\"]\n[[exclude]]\nenergy = \"hencky\"",
+            "",
+        ),
+        (
+            "[vary]\nenergy = [\"arap\", \"stretch\"]\n[[exclude]]\nenrgy = \"arap\"",
+            "",
+        ),
         ("[vary]\nenergy = [\"arap\"]\n[[exclude]]\nenergy = \"arap\"", ""),
-        ("[[zip]]\norder = [1, 2]\nlambda = [1, 2]\n[[exclude]]\norder = 1\nlambda = 2", ""),
-        ("[[zip]]\norder = [1, 2]\nlambda = [1, 2]\n[[expect]]\nwhere = { order = 1, lambda = 2 }\ninverted = 0", ""),
+        (
+            "[[zip]]\norder = [1, 2]\nlambda = [1, 2]\n[[exclude]]\norder = 1\nlambda = 2",
+            "",
+        ),
+        (
+            "[[zip]]\norder = [1, 2]\nlambda = [1, 2]\n[[expect]]\nwhere = { order = 1, lambda = 2 }\ninverted = 0",
+            "",
+        ),
         ("[[expect]]\nwhere = {}\ninverted = 0", ""),
         // Tables, plots and rates.
         ("[[table]]\nname = \"a\"\ncolumns = [\"dma\"]", ""),
@@ -248,8 +285,14 @@ fn every_mistake_has_its_place_and_its_mend() {
         ("[[table]]\nname = \"a\"\nrows = [\"energy\"]\ncolumns = [\"d_ma\"]", ""),
         ("[[table]]\nname = \"a/b\"\ncolumns = [\"d_ma\"]", ""),
         ("[[table]]\nname = \"jobs\"\ncolumns = [\"d_ma\"]", ""),
-        ("[vary]\norder = [1, 2]\n[[table]]\nname = \"a\"\nrows = \"model\"\ncolumns = [\"d_ma\"]", ""),
-        ("[[plot]]\nname = \"a\"\nx = \"h\"\ny = \"d_ma\"\n[[plot]]\nname = \"A\"\nx = \"h\"\ny = \"d_ma\"", ""),
+        (
+            "[vary]\norder = [1, 2]\n[[table]]\nname = \"a\"\nrows = \"model\"\ncolumns = [\"d_ma\"]",
+            "",
+        ),
+        (
+            "[[plot]]\nname = \"a\"\nx = \"h\"\ny = \"d_ma\"\n[[plot]]\nname = \"A\"\nx = \"h\"\ny = \"d_ma\"",
+            "",
+        ),
         ("[[plot]]\nx = \"iteratoin\"\ny = \"energy\"", ""),
         ("[[plot]]\nx = \"iteration\"\ny = \"d_ma\"", ""),
         ("[[plot]]\nx = \"h\"\ny = \"energy\"", ""),
@@ -267,20 +310,46 @@ fn every_mistake_has_its_place_and_its_mend() {
         ("[[expect]]\ninverted = { max = 1, tolerance = 1 }", ""),
         ("[[expect]]\nstop = \"convergd\"", ""),
         ("[[expect]]\nwhere = { model = \"ball\" }", ""),
-        ("[vary]\nenergy = [\"arap\", \"stretch\"]\n[[expect]]\nd_ma = { less_than = { energy = \"arap\" } }", ""),
+        (
+            "[vary]\nenergy = [\"arap\", \"stretch\"]\n[[expect]]\nd_ma = { less_than = { energy = \"arap\" } }",
+            "",
+        ),
         ("[[expect]]\nd_ma = { factor = 2.0 }", ""),
         // Printed figures.
-        ("[[table]]\nname = \"a\"\ncolumns = [\"d_ma\"]\npublished = \"nowhere.toml\"", ""),
-        ("[[table]]\nname = \"a\"\ncolumns = [\"d_ma\"]\npublished = { source = \"x\", rows = [{ model = \"ball\", inverted = 1 }] }", ""),
-        ("[[table]]\nname = \"a\"\ncolumns = [\"d_ma\"]\npublished = { source = \"x\", rows = [{ model = \"ball\" }] }", ""),
-        ("[[table]]\nname = \"a\"\ncolumns = [\"d_ma\"]\npublished = { source = \"x\", rows = [{ d_ma = 1 }] }", ""),
-        ("[[table]]\nname = \"a\"\ncolumns = [\"d_ma\"]\npublished = { source = \"x\", rows = [{ modle = \"ball\", d_ma = 1 }] }", ""),
-        ("[[table]]\nname = \"a\"\ncolumns = [\"d_ma\"]\npublished = { source = \"x\", rows = [{ model = \"cow\", d_ma = 1 }] }", ""),
-        ("[[table]]\nname = \"a\"\ncolumns = [\"d_ma\"]\npublished = { rows = [] }", ""),
+        (
+            "[[table]]\nname = \"a\"\ncolumns = [\"d_ma\"]\npublished = \"nowhere.toml\"",
+            "",
+        ),
+        (
+            "[[table]]\nname = \"a\"\ncolumns = [\"d_ma\"]\npublished = { source = \"x\", rows = [{ model = \"ball\", inverted = 1 }] }",
+            "",
+        ),
+        (
+            "[[table]]\nname = \"a\"\ncolumns = [\"d_ma\"]\npublished = { source = \"x\", rows = [{ model = \"ball\" }] }",
+            "",
+        ),
+        (
+            "[[table]]\nname = \"a\"\ncolumns = [\"d_ma\"]\npublished = { source = \"x\", rows = [{ d_ma = 1 }] }",
+            "",
+        ),
+        (
+            "[[table]]\nname = \"a\"\ncolumns = [\"d_ma\"]\npublished = { source = \"x\", rows = [{ modle = \"ball\", d_ma = 1 }] }",
+            "",
+        ),
+        (
+            "[[table]]\nname = \"a\"\ncolumns = [\"d_ma\"]\npublished = { source = \"x\", rows = [{ model = \"cow\", d_ma = 1 }] }",
+            "",
+        ),
+        (
+            "[[table]]\nname = \"a\"\ncolumns = [\"d_ma\"]\npublished = { rows = [] }",
+            "",
+        ),
     ];
     for (text, _) in cases {
         println!("{}", serde_json::to_string(text).unwrap());
-        for line in told(&format!("{HEAD}{text}")) { println!("      {line}"); }
+        for line in told(&format!("{HEAD}{text}")) {
+            println!("      {line}");
+        }
     }
     let _ = one("tittle = 1");
 }

@@ -27,7 +27,9 @@ const fn field(name: &'static str, kind: Kind, default: Default) -> Field {
 }
 
 fn energies() -> Vec<(&'static str, String)> {
-    ["dirichlet", "arap", "stretch", "hencky"].map(|name| (name, format!("the energy {name}"))).to_vec()
+    ["dirichlet", "arap", "stretch", "hencky"]
+        .map(|name| (name, format!("the energy {name}")))
+        .to_vec()
 }
 
 pub static SETTINGS: &[Field] = &[
@@ -97,7 +99,11 @@ static MODEL: ModelKind = ModelKind {
             generator_key: "shape",
             generators: &[Generator {
                 name: "cube",
-                parameters: &[field("swirl", Kind::Number { min: 0.0, max: 2.0 }, Default::Number(0.0))],
+                parameters: &[field(
+                    "swirl",
+                    Kind::Number { min: 0.0, max: 2.0 },
+                    Default::Number(0.0),
+                )],
                 doc: "A cube.",
             }],
             doc: "The target.",

@@ -31,7 +31,9 @@ pub fn execute(arguments: Arguments) -> Exit {
     compare(&first, &second, String::new(), &mut differences);
     match differences.split_first() {
         None if first_key == second_key => println!("both are the job {first_key}"),
-        None => println!("the jobs are the same, and the keys are not: one of the records is damaged; run `vargeo store verify`"),
+        None => println!(
+            "the jobs are the same, and the keys are not: one of the records is damaged; run `vargeo store verify`"
+        ),
         Some(((field, first, second), rest)) => {
             println!("the jobs differ in {field}");
             println!("  {}  {first}", short(&first_key));
@@ -52,7 +54,9 @@ fn short(key: &str) -> &str {
 /// The key that begins with these digits, and its job.
 fn find(store: &Path, digits: &str) -> Result<(String, Value), String> {
     if digits.len() < 4 || digits.len() > 64 || !digits.bytes().all(|byte| byte.is_ascii_hexdigit()) {
-        return Err(format!("\"{digits}\" is no key; give at least four of its 64 hexadecimal digits, as `vargeo plan` shows them"));
+        return Err(format!(
+            "\"{digits}\" is no key; give at least four of its 64 hexadecimal digits, as `vargeo plan` shows them"
+        ));
     }
     let digits = digits.to_lowercase();
     let shard = store.join(&digits[..2]);
@@ -65,17 +69,32 @@ fn find(store: &Path, digits: &str) -> Result<(String, Value), String> {
     }
     found.sort();
     let key = match found.as_slice() {
-        [] => return Err(format!("{} has no record of {digits}; run its experiment first", store.display())),
+        [] => {
+            return Err(format!(
+                "{} has no record of {digits}; run its experiment first",
+                store.display()
+            ));
+        }
         [key] => key.clone(),
-        several => return Err(format!("{digits} begins {} keys: {}; give more digits", several.len(), several.join(", "))),
+        several => {
+            return Err(format!(
+                "{digits} begins {} keys: {}; give more digits",
+                several.len(),
+                several.join(", ")
+            ));
+        }
     };
     let path = shard.join(&key).join("record.json");
-    let text = std::fs::read_to_string(&path).map_err(|error| format!("{}: cannot be read: {error}", path.display()))?;
+    let text =
+        std::fs::read_to_string(&path).map_err(|error| format!("{}: cannot be read: {error}", path.display()))?;
     let record: Value = serde_json::from_str(&text)
         .map_err(|error| format!("{}: damaged ({error}); run `vargeo store verify`", path.display()))?;
     match record.get("job") {
         Some(job) => Ok((key, job.clone())),
-        None => Err(format!("{}: damaged (no job in it); run `vargeo store verify`", path.display())),
+        None => Err(format!(
+            "{}: damaged (no job in it); run `vargeo store verify`",
+            path.display()
+        )),
     }
 }
 
@@ -87,7 +106,11 @@ fn compare(first: &Value, second: &Value, path: String, differences: &mut Vec<(S
             names.sort();
             names.dedup();
             for name in names {
-                let inner = if path.is_empty() { name.clone() } else { format!("{path}.{name}") };
+                let inner = if path.is_empty() {
+                    name.clone()
+                } else {
+                    format!("{path}.{name}")
+                };
                 compare(
                     first.get(name).unwrap_or(&Value::Null),
                     second.get(name).unwrap_or(&Value::Null),

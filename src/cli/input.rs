@@ -1,7 +1,7 @@
 //! What every command on an experiment file shares: the file, the folders of models, and how diagnostics are shown.
 
 use super::Exit;
-use crate::experiment::diagnostic::{Diagnostic, render};
+use crate::experiment::diagnostic::{Diagnostic, Severity, render};
 use crate::experiment::file::Experiment;
 use crate::experiment::plan::{Lookup, Plan};
 use crate::method;
@@ -20,15 +20,12 @@ pub struct Input {
 }
 
 impl Input {
-    /// Reads the file and unfolds its plan. What is wrong is printed, with the notices and warnings, on standard error.
+    /// Reads the file and unfolds its plan. What is wrong or doubtful is printed on standard error; the plan's notices are
+    /// left to the caller.
     pub fn plan(&self) -> Result<Plan, Exit> {
         let experiment = Experiment::read(&self.file, method::methods()).map_err(|diagnostics| fail(&diagnostics))?;
         show(&experiment.origin.warnings);
-        let plan = Plan::new(experiment, &self.lookup()?).map_err(|diagnostics| fail(&diagnostics))?;
-        for notice in &plan.notices {
-            eprintln!("notice: {notice}");
-        }
-        Ok(plan)
+        Plan::new(experiment, &self.lookup()?).map_err(|diagnostics| fail(&diagnostics))
     }
 
     fn lookup(&self) -> Result<Lookup, Exit> {
@@ -53,8 +50,10 @@ pub fn show(diagnostics: &[Diagnostic]) {
 /// Prints diagnostics that keep a command from going on.
 pub fn fail(diagnostics: &[Diagnostic]) -> Exit {
     show(diagnostics);
-    let errors = diagnostics.iter().filter(|diagnostic| diagnostic.severity == crate::experiment::diagnostic::Severity::Error);
-    let count = errors.count();
+    let count = diagnostics
+        .iter()
+        .filter(|diagnostic| diagnostic.severity == Severity::Error)
+        .count();
     if count > 1 {
         eprintln!("{count} errors; nothing was run");
     }

@@ -2,9 +2,10 @@
 
 use super::Exit;
 use super::input::Input;
-use crate::experiment::grid::describe;
-use crate::experiment::job::Key;
+use crate::experiment::grid;
 use crate::experiment::plan::Plan;
+use crate::run::pool::{effort, stored};
+use crate::run::store::{Lookup, Store};
 use std::io::{self, Write};
 use std::path::PathBuf;
 
@@ -24,42 +25,68 @@ pub fn execute(arguments: Arguments) -> Exit {
         Ok(plan) => plan,
         Err(exit) => return exit,
     };
-    let store = arguments.results.join("store");
-    // As a run would find it, but for the checks of its content.
-    let stored = |key: &Key| key.0.get(..2).is_some_and(|shard| store.join(shard).join(&key.0).join("record.json").is_file());
-    let mut text = Vec::new();
-    let _ = print(&plan, &stored, &mut text);
-    let _ = io::stdout().write_all(&text);
+    let store = Store::new(arguments.results.join("store"));
+    let effort = effort(&plan, None);
+    let states: Vec<State> = plan
+        .jobs
+        .iter()
+        .map(|job| match (&job.resolved, stored(&store, job, effort)) {
+            (None, _) => State::Missing,
+            (_, Lookup::Hit(_)) => State::Stored,
+            (_, Lookup::Miss) => State::ToRun,
+            (_, Lookup::Damaged { reason, .. }) => {
+                eprintln!(
+                    "warning: the stored result of {} is damaged ({reason}); it will be computed again",
+                    job.name
+                );
+                State::ToRun
+            }
+        })
+        .collect();
+    // A reader who has gone away is no error.
+    let _ = io::stdout().write_all(describe(&plan, &states).as_bytes());
     Exit::Well
 }
 
-/// Writes the count of jobs, then a line for each.
-fn print(plan: &Plan, stored: &dyn Fn(&Key) -> bool, out: &mut dyn Write) -> io::Result<()> {
-    let states: Vec<&str> = plan
-        .jobs
-        .iter()
-        .map(|job| match &job.resolved {
-            None => "missing",
-            Some((key, _)) if stored(key) => "stored",
-            Some(_) => "to run",
-        })
-        .collect();
-    let count = |state: &str| states.iter().filter(|other| **other == state).count();
-    let experiment = &plan.experiment;
-    writeln!(
-        out,
-        "{}: {} job{}, {} to run, {} stored, {} missing",
-        experiment.title,
+/// What would become of a job.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum State {
+    ToRun,
+    Stored,
+    Missing,
+}
+
+/// The count of jobs, then a line for each, then the notices.
+fn describe(plan: &Plan, states: &[State]) -> String {
+    let count = |state: State| states.iter().filter(|other| **other == state).count();
+    let mut text = format!(
+        "{}: {} job{}; {} to run, {} stored, {} missing\n",
+        plan.experiment.title,
         plan.jobs.len(),
         if plan.jobs.len() == 1 { "" } else { "s" },
-        count("to run"),
-        count("stored"),
-        count("missing"),
-    )?;
+        count(State::ToRun),
+        count(State::Stored),
+        count(State::Missing),
+    );
     let width = plan.jobs.iter().map(|job| job.name.len()).max().unwrap_or(0);
     for (job, state) in plan.jobs.iter().zip(states) {
-        let key = job.resolved.as_ref().map_or("", |(key, _)| key.0.get(..12).unwrap_or(&key.0));
-        writeln!(out, "  {state:<7}  {key:<12}  {:<width$}  {}", job.name, describe(&job.axes))?;
+        let state = match state {
+            State::ToRun => "to run",
+            State::Stored => "stored",
+            State::Missing => "missing",
+        };
+        let key = job
+            .resolved
+            .as_ref()
+            .map_or("", |(key, _)| key.0.get(..12).unwrap_or(&key.0));
+        text += &format!(
+            "  {state:<7}  {key:<12}  {:<width$}  {}\n",
+            job.name,
+            grid::describe(&job.axes)
+        );
     }
-    Ok(())
+    for notice in &plan.notices {
+        text += &format!("notice: {notice}\n");
+    }
+    text
 }

@@ -16,4 +16,5 @@ pub mod read;
 pub mod record;
 pub mod schema;
 pub mod section;
+pub mod template;
 pub mod unit;

@@ -17,7 +17,10 @@ use serde_json::{Map, Value, json};
 pub fn schema(methods: &[&'static dyn Method]) -> Value {
     let names: Vec<&str> = methods.iter().map(|method| method.name()).collect();
     let mut definitions = Map::new();
-    definitions.insert("duration".to_owned(), quantity(DURATIONS, "A duration such as \"10 min\"."));
+    definitions.insert(
+        "duration".to_owned(),
+        quantity(DURATIONS, "A duration such as \"10 min\"."),
+    );
     definitions.insert("size".to_owned(), quantity(SIZES, "A size such as \"8 GiB\"."));
     let mut cases = Vec::new();
     for method in methods {
@@ -80,7 +83,10 @@ pub fn kind(kind: &Kind) -> Value {
 /// Words with their meanings in the description, where editors show them.
 fn words_of(words: impl Iterator<Item = (&'static str, String)>) -> Value {
     let words: Vec<(&str, String)> = words.collect();
-    let meanings: Vec<String> = words.iter().map(|(word, meaning)| format!("{word}: {meaning}")).collect();
+    let meanings: Vec<String> = words
+        .iter()
+        .map(|(word, meaning)| format!("{word}: {meaning}"))
+        .collect();
     let names: Vec<&str> = words.iter().map(|(word, _)| *word).collect();
     json!({ "type": "string", "enum": names, "description": meanings.join("\n") })
 }
@@ -99,7 +105,10 @@ fn field(field: &Field) -> Value {
 
 /// Puts a meaning before what a schema says of itself.
 fn described(mut schema: Value, doc: &str) -> Value {
-    let more = schema.get("description").and_then(Value::as_str).map(|text| format!("\n{text}"));
+    let more = schema
+        .get("description")
+        .and_then(Value::as_str)
+        .map(|text| format!("\n{text}"));
     schema["description"] = json!(format!("{doc}{}", more.unwrap_or_default()));
     schema
 }
@@ -239,7 +248,10 @@ impl Scope {
         }
         // Written without quotes, `model.tetrahedra` is a table within the table.
         let table = json!({ "type": "object", "properties": nested });
-        properties.insert("model".to_owned(), json!({ "anyOf": [text, table], "description": "Names of models." }));
+        properties.insert(
+            "model".to_owned(),
+            json!({ "anyOf": [text, table], "description": "Names of models." }),
+        );
         json!({ "type": "object", "properties": properties, "additionalProperties": false, "minProperties": 1 })
     }
 
@@ -261,7 +273,12 @@ impl Scope {
     }
 
     fn coordinate(&self) -> Value {
-        let traces = words_of(self.method.traces().iter().map(|(name, meaning)| (*name, (*meaning).to_owned())));
+        let traces = words_of(
+            self.method
+                .traces()
+                .iter()
+                .map(|(name, meaning)| (*name, (*meaning).to_owned())),
+        );
         json!({ "anyOf": [traces, self.refer("column"), self.refer("axis")] })
     }
 
@@ -282,7 +299,10 @@ fn parameters(method: &dyn Method) -> Vec<(bool, &'static str, &'static str, Vec
     for role in method.model().roles {
         for field in role.generators.iter().flat_map(|generator| generator.parameters) {
             let schema = described(kind(&field.kind), field.doc);
-            match found.iter_mut().find(|(_, known, name, _)| *known == role.name && *name == field.name) {
+            match found
+                .iter_mut()
+                .find(|(_, known, name, _)| *known == role.name && *name == field.name)
+            {
                 Some((_, _, _, schemas)) if schemas.contains(&schema) => {}
                 Some((_, _, _, schemas)) => schemas.push(schema),
                 None => found.push((main == Some(role.name), role.name, field.name, vec![schema])),
@@ -316,7 +336,10 @@ fn fields_as_axes(fields: &[Field], prefix: &str, wrap: &dyn Fn(Value) -> Value)
                 let dotted = fields_as_axes(inner, &format!("{path}."), wrap);
                 let nested = fields_as_axes(inner, "", wrap);
                 let table = json!({ "type": "object", "properties": nested, "additionalProperties": false });
-                properties.insert(path, json!({ "anyOf": [own, table], "description": expectation(&field.kind) }));
+                properties.insert(
+                    path,
+                    json!({ "anyOf": [own, table], "description": expectation(&field.kind) }),
+                );
                 properties.extend(dotted);
             }
         }

@@ -11,6 +11,4 @@ pub mod processor;
 pub mod vector3;
 pub mod svd3;
 pub mod eigen3;
-//! Everything here is deterministic: the same input gives the same bits with any number of threads.
-
 pub mod sparse;

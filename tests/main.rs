@@ -2,6 +2,7 @@
 
 mod damaged_files;
 mod energies;
+mod experiment_files;
 mod floors;
 mod formats;
 mod gate;
@@ -16,3 +17,4 @@ mod sparse;
 mod store;
 mod volume_map;
 mod volume_map_feasibility;
+mod tiny_method;

@@ -230,7 +230,10 @@ fn summary(plan: &Plan, finished: &[Finished]) -> String {
     let count = |test: &dyn Fn(&Finished) -> bool| finished.iter().filter(|finished| test(finished)).count();
     let status = |finished: &Finished| finished.record.result.status;
     let parts = [
-        (count(&|job| !job.cached && !failed(&job.record) && status(job) != Status::Skipped), "computed"),
+        (
+            count(&|job| !job.cached && !failed(&job.record) && status(job) != Status::Skipped),
+            "computed",
+        ),
         (count(&|job| job.cached), "from the store"),
         (count(&|job| !job.cached && failed(&job.record)), "failed"),
         (count(&|job| status(job) == Status::Skipped), "skipped"),

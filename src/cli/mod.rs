@@ -4,6 +4,7 @@ mod job;
 mod list;
 mod mesh;
 mod progress;
+mod run;
 mod store;
 
 use clap::{Parser, Subcommand};
@@ -39,6 +40,7 @@ const EXIT_CODES: &str = "Exit codes: 0 all well, 1 an expectation was not met, 
 
 #[derive(Subcommand)]
 enum Command {
+    Run(run::Arguments),
     List(list::Arguments),
     Mesh(mesh::Arguments),
     Store(store::Arguments),
@@ -61,6 +63,7 @@ pub fn main() -> ExitCode {
         }
     };
     let exit = match arguments.command {
+        Command::Run(arguments) => run::execute(arguments),
         Command::List(arguments) => list::execute(arguments),
         Command::Mesh(arguments) => mesh::execute(arguments),
         Command::Store(arguments) => store::execute(arguments),

@@ -5,6 +5,7 @@
 
 pub mod setting;
 pub mod model;
+pub mod volume_map;
 
 use crate::metric::Metric;
 use crate::optimize::Observer;
@@ -88,7 +89,7 @@ pub trait Method: Sync {
 
 /// Every method, in the order of the documentation.
 pub fn methods() -> &'static [&'static dyn Method] {
-    &[]
+    &[&volume_map::VolumeMap]
 }
 
 /// The method of this name.

@@ -62,6 +62,8 @@ pub struct Options {
     pub threads: Option<usize>,
     /// Compute everything again and compare with what is stored.
     pub force: bool,
+    /// Compute only these jobs of the plan; the others are returned as far as they are stored.
+    pub only: Option<Vec<usize>>,
     pub interrupt: Interrupt,
 }
 
@@ -77,7 +79,8 @@ pub struct Finished {
 /// What a run leaves.
 #[derive(Debug, Default)]
 pub struct Run {
-    /// In the order of the plan. After an interruption, jobs that did not finish are absent.
+    /// In the order of the plan. Jobs that were not asked for and are not stored are absent, and so are, after an
+    /// interruption, those that did not finish.
     pub finished: Vec<Finished>,
     pub interrupted: bool,
     /// Damage, results that are not deterministic, records that could not be written.
@@ -188,11 +191,15 @@ impl Pool<'_> {
     /// Fills the queue with what the store does not hold.
     fn look_up(&mut self) {
         let jobs = &self.plan.jobs;
+        let options = self.options;
+        let wanted = |index: usize| options.only.as_ref().is_none_or(|only| only.contains(&index));
+        let effort = self.effort;
         let found: Vec<Lookup> = jobs
             .par_iter()
-            .map(|job| match self.options.force {
+            .enumerate()
+            .map(|(index, job)| match options.force && wanted(index) {
                 true => Lookup::Miss,
-                false => stored(&self.options.store, job, self.effort),
+                false => stored(&options.store, job, effort),
             })
             .collect();
         let mut tasks: BTreeMap<Key, usize> = BTreeMap::new();
@@ -210,6 +217,9 @@ impl Pool<'_> {
                 }
                 Lookup::Damaged { reason, quarantine } => warnings.push(damage(&key.0, &reason, &quarantine)),
                 Lookup::Miss => {}
+            }
+            if !wanted(index) {
+                continue;
             }
             match tasks.get(key) {
                 Some(&place) => self.queue[place].indices.push(index),
@@ -231,7 +241,7 @@ impl Pool<'_> {
             jobs: jobs.len(),
             stored,
             skipped: finished.len() - stored,
-            missing: jobs.len() - finished.len(),
+            missing: self.queue.iter().map(|task| task.indices.len()).sum(),
             side_by_side: self.side_by_side(),
             threads: self.effort.threads,
         });

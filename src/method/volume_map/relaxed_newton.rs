@@ -222,7 +222,8 @@ impl Run<'_> {
     /// A few steps with the boundary's present positions as its targets.
     fn relax(&mut self, problem: &Problem, weight: f64) {
         self.relaxations += 1;
-        self.objective.set_pull(Some(Pull { weight, targets: self.objective.positions(&self.x) }));
+        let present = self.objective.positions(&self.x);
+        self.objective.set_pull(Some(Pull { weight, targets: present }));
         for _ in 0..self.options.relaxation_steps {
             match self.update(false) {
                 // Less than this moves nothing that matters to the next step.

@@ -336,7 +336,7 @@ const HESSIANS: &[(&str, &str)] = &[
 ];
 
 fn energy_names() -> Vec<(&'static str, String)> {
-    energy::energies().iter().map(|energy| (energy.name(), energy.summary().to_string())).collect()
+    energy::energies().iter().map(|energy| (energy.name(), energy.formula().to_string())).collect()
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]

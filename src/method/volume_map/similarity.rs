@@ -109,7 +109,7 @@ pub fn thirteen_variables(from: &[[f64; 3]], to: &[[f64; 3]]) -> Similarity {
         let size = hessian.norm();
         let mut step = None;
         for _ in 0..60 {
-            let shifted = &hessian + shift * DMatrix::identity(9, 9);
+            let shifted = &hessian + shift * DMatrix::<f64>::identity(9, 9);
             if let Some(factor) = shifted.cholesky() {
                 step = Some(factor.solve(&right));
                 break;

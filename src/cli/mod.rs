@@ -1,9 +1,12 @@
 //! The command line: one command a file, each with its arguments and its `execute`.
 
+mod check;
+mod compare;
 mod job;
 mod list;
 mod mesh;
 mod progress;
+mod report;
 mod run;
 mod store;
 
@@ -41,6 +44,9 @@ const EXIT_CODES: &str = "Exit codes: 0 all well, 1 an expectation was not met, 
 #[derive(Subcommand)]
 enum Command {
     Run(run::Arguments),
+    Check(check::Arguments),
+    Report(report::Arguments),
+    Compare(compare::Arguments),
     List(list::Arguments),
     Mesh(mesh::Arguments),
     Store(store::Arguments),
@@ -64,6 +70,9 @@ pub fn main() -> ExitCode {
     };
     let exit = match arguments.command {
         Command::Run(arguments) => run::execute(arguments),
+        Command::Check(arguments) => check::execute(arguments),
+        Command::Report(arguments) => report::execute(arguments),
+        Command::Compare(arguments) => compare::execute(arguments),
         Command::List(arguments) => list::execute(arguments),
         Command::Mesh(arguments) => mesh::execute(arguments),
         Command::Store(arguments) => store::execute(arguments),

@@ -1,7 +1,7 @@
 //! A job as the report sees it, what it can be asked for by name, and conditions on its axes.
 
-use crate::experiment::file::{Condition, Experiment};
 use crate::experiment::column;
+use crate::experiment::file::{Condition, Experiment};
 use crate::experiment::record::{MEASUREMENTS, Record, Status};
 use crate::metric::Better;
 use serde_json::Value;
@@ -146,7 +146,12 @@ impl Quantity {
             Some(column) => Quantity {
                 name: name.into(),
                 symbol: column.symbol.into(),
-                unit: if measured && column.unit == "B" { "MiB" } else { column.unit }.into(),
+                unit: if measured && column.unit == "B" {
+                    "MiB"
+                } else {
+                    column.unit
+                }
+                .into(),
                 better: column.better,
                 definition: column.definition.into(),
                 digits: if measured { 3 } else { 4 },

@@ -1,7 +1,8 @@
 //! `vargeo check`: run, then gate by the file's expectations, for CI.
 
 use super::Exit;
-use super::run::{self, Planning, Running};
+use super::input::Input;
+use super::run::{self, Running};
 use crate::report::gate::{Outcome, Verdict};
 use crate::report::table::terminal::plain;
 use crate::report::{junit, publish};
@@ -13,7 +14,7 @@ use std::path::{Path, PathBuf};
 #[derive(clap::Args)]
 pub struct Arguments {
     #[command(flatten)]
-    planning: Planning,
+    input: Input,
     #[command(flatten)]
     running: Running,
     /// Write the verdicts as JUnit XML.
@@ -23,7 +24,7 @@ pub struct Arguments {
 
 /// Runs, reports, judges.
 pub fn execute(arguments: Arguments) -> Exit {
-    let done = run::plan(&arguments.planning).and_then(|plan| {
+    let done = arguments.input.plan().and_then(|plan| {
         let done = run::run(&plan, &arguments.running)?;
         Ok((plan, done))
     });

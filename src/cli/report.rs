@@ -1,7 +1,8 @@
 //! `vargeo report`: the report of an experiment from its stored records, without running anything.
 
 use super::Exit;
-use super::run::{self, Planning};
+use super::input::Input;
+use super::run;
 use crate::experiment::record::Record;
 use crate::run::Finished;
 use crate::run::pool::{effort, skipped};
@@ -12,7 +13,7 @@ use std::path::PathBuf;
 #[derive(clap::Args)]
 pub struct Arguments {
     #[command(flatten)]
-    planning: Planning,
+    input: Input,
     /// Folder of results.
     #[arg(long, value_name = "DIR", default_value = "results")]
     results: PathBuf,
@@ -23,7 +24,7 @@ pub struct Arguments {
 
 /// Reports what is stored; jobs that never ran are named and left out.
 pub fn execute(arguments: Arguments) -> Exit {
-    let plan = match run::plan(&arguments.planning) {
+    let plan = match arguments.input.plan() {
         Ok(plan) => plan,
         Err(exit) => return exit,
     };

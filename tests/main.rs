@@ -18,3 +18,6 @@ mod store;
 mod volume_map;
 mod volume_map_feasibility;
 mod tiny_method;
+mod connectivity;
+mod generators;
+mod mesh_checks;

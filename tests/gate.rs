@@ -28,12 +28,20 @@ fn judge(change: impl FnOnce(&mut Expectation)) -> Vec<Verdict> {
 }
 
 fn outcomes(verdicts: &[Verdict]) -> Vec<(&str, Outcome)> {
-    verdicts.iter().map(|verdict| (verdict.subject.as_str(), verdict.outcome)).collect()
+    verdicts
+        .iter()
+        .map(|verdict| (verdict.subject.as_str(), verdict.outcome))
+        .collect()
 }
 
 #[test]
 fn bounds_hold_at_their_ends() {
-    let bound = |min, max, equals, tolerance| Bound { min, max, equals, tolerance };
+    let bound = |min, max, equals, tolerance| Bound {
+        min,
+        max,
+        equals,
+        tolerance,
+    };
     assert!(holds(&bound(Some(1.0), Some(2.0), None, None), 1.0));
     assert!(holds(&bound(Some(1.0), Some(2.0), None, None), 2.0));
     assert!(!holds(&bound(Some(1.0), Some(2.0), None, None), 2.1));
@@ -46,16 +54,29 @@ fn bounds_hold_at_their_ends() {
 #[test]
 fn figures_are_held_against_bounds_in_every_job() {
     let verdicts = judge(|one| {
-        one.bounds.insert("d_ma".into(), Bound { max: Some(20.0), ..Bound::default() });
+        one.bounds.insert(
+            "d_ma".into(),
+            Bound {
+                max: Some(20.0),
+                ..Bound::default()
+            },
+        );
     });
     assert_eq!(
         outcomes(&verdicts),
-        [("ball-dirichlet", Outcome::Failed), ("ball-stretch", Outcome::Met), ("ball-lscm", Outcome::Failed)]
+        [
+            ("ball-dirichlet", Outcome::Failed),
+            ("ball-stretch", Outcome::Met),
+            ("ball-lscm", Outcome::Failed)
+        ]
     );
     assert_eq!(verdicts[0].found, "273.7");
     assert_eq!(verdicts[0].expected, "d_ma at most 20");
     assert_eq!(verdicts[0].place, "line 7");
-    assert!(verdicts[2].found.contains("time-limit: stopped after 600 s"), "a job without figure fails with its reason");
+    assert!(
+        verdicts[2].found.contains("time-limit: stopped after 600 s"),
+        "a job without figure fails with its reason"
+    );
 }
 
 #[test]
@@ -64,7 +85,10 @@ fn stops_can_be_expected_of_failed_jobs() {
         one.condition = condition(&[("energy", &[json!("lscm")])]);
         one.stop = Some("time-limit".into());
     });
-    assert_eq!(outcomes(&verdicts), [("ball-lscm", Outcome::Met), ("duck-lscm", Outcome::Failed)]);
+    assert_eq!(
+        outcomes(&verdicts),
+        [("ball-lscm", Outcome::Met), ("duck-lscm", Outcome::Failed)]
+    );
 }
 
 #[test]
@@ -106,7 +130,13 @@ fn an_expectation_that_matches_no_job_fails() {
 fn missing_optional_models_open_the_gate() {
     let verdicts = judge(|one| {
         one.condition = condition(&[("model", &[json!("horse")])]);
-        one.bounds.insert("inverted".into(), Bound { equals: Some(0.0), ..Bound::default() });
+        one.bounds.insert(
+            "inverted".into(),
+            Bound {
+                equals: Some(0.0),
+                ..Bound::default()
+            },
+        );
     });
     assert_eq!(outcomes(&verdicts), [("horse-stretch", Outcome::Skipped)]);
     assert!(gate::passes(&verdicts));
@@ -117,7 +147,10 @@ fn numbers_of_axes_match_by_value() {
     let (rows, _) = sample::study();
     assert!(rows[0].matches(&condition(&[("seed", &[json!(1.0)])])));
     assert!(!rows[0].matches(&condition(&[("seed", &[json!(2), json!(3)])])));
-    assert!(rows[0].matches(&condition(&[("solver.newton.omega", &[json!(100_000_000)])])), "a setting held fixed");
+    assert!(
+        rows[0].matches(&condition(&[("solver.newton.omega", &[json!(100_000_000)])])),
+        "a setting held fixed"
+    );
     assert!(!rows[0].matches(&condition(&[("solver.newton.relaxation", &[json!(true)])])));
 }
 
@@ -130,7 +163,10 @@ fn rates_are_gated() {
         ..sample::experiment()
     };
     let verdicts = gate::judge(&experiment, &rows, &rate::fits(&experiment, &rows));
-    assert_eq!(outcomes(&verdicts), [("even", Outcome::Met), ("random", Outcome::Failed)]);
+    assert_eq!(
+        outcomes(&verdicts),
+        [("even", Outcome::Met), ("random", Outcome::Failed)]
+    );
     let empty = gate::judge(&experiment, &[], &[]);
     assert_eq!(outcomes(&empty), [("", Outcome::Failed)]);
 }

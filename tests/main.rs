@@ -1,6 +1,7 @@
 //! One test binary; a file a property.
 
 mod energies;
+mod experiment_files;
 mod floors;
 mod gate;
 mod kernels;
@@ -13,3 +14,4 @@ mod sample;
 mod sparse;
 mod formats;
 mod store;
+mod tiny_method;

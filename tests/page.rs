@@ -19,7 +19,10 @@ fn ten() -> Vec<Row> {
         .map(|index| {
             let mut row = sample::rows().swap_remove(index % 4);
             row.name = format!("ball-{index}");
-            row.axes = vec![("model".into(), json!("ball")), ("energy".into(), json!(format!("energy {index}")))];
+            row.axes = vec![
+                ("model".into(), json!("ball")),
+                ("energy".into(), json!(format!("energy {index}"))),
+            ];
             row.mesh = Some(sample::mesh(13, 0.15 * index as f64));
             row
         })
@@ -58,14 +61,25 @@ fn ten_meshes_stay_below_a_megabyte() {
     assert_eq!(page.matches("id=\"job-").count(), 10);
     assert_eq!(page.matches("id=\"mesh-").count(), 1, "one mesh is stored once");
     assert_eq!(page.matches("src=\"data:image/png;base64,").count(), 10);
-    assert!(!page.contains("src=\"http") && !page.contains("<link"), "nothing is loaded");
+    assert!(
+        !page.contains("src=\"http") && !page.contains("<link"),
+        "nothing is loaded"
+    );
 }
 
 #[test]
 fn every_end_of_a_job_has_its_place() {
     let page = written(&sample::experiment(), &sample::rows());
     assert_well_formed(&page);
-    for text in ["time-limit", "stopped after 600 s", "infeasible", "boundary triangle 17", "missing-model", "step-limit", "no result mesh"] {
+    for text in [
+        "time-limit",
+        "stopped after 600 s",
+        "infeasible",
+        "boundary triangle 17",
+        "missing-model",
+        "step-limit",
+        "no result mesh",
+    ] {
         assert!(page.contains(text), "{text}");
     }
     assert!(!page.contains("NaN") && !page.contains("nan<"));
@@ -107,9 +121,15 @@ fn text_cannot_become_markup() {
 #[test]
 fn the_same_records_give_the_same_bytes() {
     let read = |folder: &Path| {
-        let mut files: Vec<_> = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
+        let mut files: Vec<_> = std::fs::read_dir(folder)
+            .unwrap()
+            .map(|entry| entry.unwrap().path())
+            .collect();
         files.sort();
-        files.iter().map(|file| (file.file_name().unwrap().to_owned(), std::fs::read(file).unwrap())).collect::<Vec<_>>()
+        files
+            .iter()
+            .map(|file| (file.file_name().unwrap().to_owned(), std::fs::read(file).unwrap()))
+            .collect::<Vec<_>>()
     };
     let mut rows = sample::rows();
     rows[1].mesh = Some(sample::mesh(4, 0.4));

@@ -6,7 +6,10 @@ use vargeo::report::rate::{fit, fits};
 #[test]
 fn an_exact_power_law_is_recovered() {
     for slope in [-3.0, 0.5, 1.75, 2.0] {
-        let points: Vec<(f64, f64)> = (0..6).map(|level| 0.5f64.powi(level)).map(|h| (h, 7.0 * h.powf(slope))).collect();
+        let points: Vec<(f64, f64)> = (0..6)
+            .map(|level| 0.5f64.powi(level))
+            .map(|h| (h, 7.0 * h.powf(slope)))
+            .collect();
         let line = fit(&points).unwrap();
         assert!((line.slope - slope).abs() < 1e-12);
         assert!((line.intercept.exp() - 7.0).abs() < 1e-11);
@@ -40,7 +43,10 @@ fn series_seeds_windows_and_the_last_pair() {
     let mut experiment = sample::experiment();
     experiment.rates = vec![rate.clone()];
     let found = fits(&experiment, &rows);
-    assert_eq!(found.iter().map(|fit| fit.series.as_str()).collect::<Vec<_>>(), ["even", "random"]);
+    assert_eq!(
+        found.iter().map(|fit| fit.series.as_str()).collect::<Vec<_>>(),
+        ["even", "random"]
+    );
     for (fit, slope) in found.iter().zip([2.0, 1.5]) {
         let line = fit.line.unwrap();
         assert_eq!(fit.points.len(), 15);
@@ -54,7 +60,11 @@ fn series_seeds_windows_and_the_last_pair() {
     let mut windowed = rate;
     windowed.window = Some([0.02, 0.11]);
     experiment.rates = vec![windowed];
-    assert_eq!(fits(&experiment, &rows)[0].points.len(), 9, "three of five levels, three seeds");
+    assert_eq!(
+        fits(&experiment, &rows)[0].points.len(),
+        9,
+        "three of five levels, three seeds"
+    );
 }
 
 #[test]

@@ -8,12 +8,27 @@ use vargeo::report::{compare, jobs, macros, number, plot};
 
 #[test]
 fn numbers_round_to_significant_digits() {
-    let plain: Vec<String> = [0.0, 1.0, -12.34567, 0.000_123_456, 0.001_234_56, 999.96, 123_456.7, 1.5e6, 12_345_678.9, -0.0, 2_464.0]
-        .iter()
-        .map(|&value| number::round(value, 4).plain())
-        .collect();
+    let plain: Vec<String> = [
+        0.0,
+        1.0,
+        -12.34567,
+        0.000_123_456,
+        0.001_234_56,
+        999.96,
+        123_456.7,
+        1.5e6,
+        12_345_678.9,
+        -0.0,
+        2_464.0,
+    ]
+    .iter()
+    .map(|&value| number::round(value, 4).plain())
+    .collect();
     insta::assert_snapshot!(plain.join(" "), @"");
-    assert_eq!(number::round(-1.234e-7, 3).unicode(), "\u{2212}1.23\u{d7}10\u{207b}\u{2077}");
+    assert_eq!(
+        number::round(-1.234e-7, 3).unicode(),
+        "\u{2212}1.23\u{d7}10\u{207b}\u{2077}"
+    );
     assert_eq!(number::round(-1.234e-7, 3).latex(), "$-1.23\\cdot 10^{-7}$");
     assert_eq!(number::round(f64::NAN, 3).plain(), "undefined");
     assert_eq!(number::bytes(123 << 20), "123 MiB");
@@ -84,10 +99,19 @@ fn logarithmic_axes_have_labelled_decades() {
 #[test]
 fn short_logarithmic_axes_have_ticks_all_the_same() {
     for (low, high) in [(2.0, 7.0), (6.31, 6.34), (0.9, 1.1), (3.0, 3.0), (1e-30, 1e30)] {
-        let axis = plot::axis::Axis::new(String::new(), plot::axis::Kind::Logarithmic, [low, high].into_iter(), false);
+        let axis = plot::axis::Axis::new(
+            String::new(),
+            plot::axis::Kind::Logarithmic,
+            [low, high].into_iter(),
+            false,
+        );
         let labelled = axis.ticks.iter().filter(|tick| tick.label.is_some()).count();
         assert!((2..=10).contains(&labelled), "{low} to {high}: {labelled} labels");
-        assert!(axis.ticks.iter().all(|tick| (-1e-6..1.000_001).contains(&axis.position(tick.value))));
+        assert!(
+            axis.ticks
+                .iter()
+                .all(|tick| (-1e-6..1.000_001).contains(&axis.position(tick.value)))
+        );
     }
 }
 
@@ -98,7 +122,14 @@ fn series_are_told_apart_without_colour() {
     assert!(chart.series.iter().all(|series| series.phases == [8.0]));
     let svg = plot::svg::standalone(&chart).unwrap();
     // The second series is dashed: its path begins anew for each dash; every series has its own kind of marker and its name.
-    let path = |index: usize| svg.split(&format!("<path class=\"s{index}\" stroke-width=\"9\" d=\"")).nth(1).unwrap().split('"').next().unwrap();
+    let path = |index: usize| {
+        svg.split(&format!("<path class=\"s{index}\" stroke-width=\"9\" d=\""))
+            .nth(1)
+            .unwrap()
+            .split('"')
+            .next()
+            .unwrap()
+    };
     assert_eq!(path(0).matches('M').count(), 1);
     assert!(path(1).matches('M').count() > 20);
     assert!(svg.contains("<circle class=\"f0\"") && svg.contains("<polygon class=\"f1\""));
@@ -117,7 +148,10 @@ fn what_cannot_be_shown_on_a_plot_is_told() {
     rows.truncate(6);
     let chart = plot::chart(&sample::experiment(), &plot("h", "error", true), &rows);
     let notes = chart.notes.join(" ");
-    assert!(notes.contains("2 points are not shown") && notes.contains("even-2-0"), "{notes}");
+    assert!(
+        notes.contains("2 points are not shown") && notes.contains("even-2-0"),
+        "{notes}"
+    );
     let empty = plot::chart(&sample::experiment(), &plot("h", "error", true), &[]);
     assert!(plot::svg::standalone(&empty).is_ok() && plot::bitmap::write(&empty).is_ok());
     assert!(empty.notes.join(" ").contains("nothing to show"));

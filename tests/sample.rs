@@ -65,14 +65,20 @@ impl Method for Sample {
 }
 
 pub fn condition(entries: &[(&str, &[Value])]) -> Condition {
-    entries.iter().map(|(axis, values)| (axis.to_string(), values.to_vec())).collect()
+    entries
+        .iter()
+        .map(|(axis, values)| (axis.to_string(), values.to_vec()))
+        .collect()
 }
 
 /// A row with an outcome.
 pub fn row(name: &str, axes: &[(&str, Value)], metrics: &[(&str, f64)]) -> Row {
     Row {
         name: name.into(),
-        axes: axes.iter().map(|(axis, value)| (axis.to_string(), value.clone())).collect(),
+        axes: axes
+            .iter()
+            .map(|(axis, value)| (axis.to_string(), value.clone()))
+            .collect(),
         record: Record {
             key: Key(format!("{:064x}", name.bytes().map(u64::from).sum::<u64>())),
             job: Job {
@@ -153,9 +159,21 @@ pub fn rows() -> Vec<Row> {
             let iterations: Vec<f64> = (0..40).map(f64::from).collect();
             let fall = if energy == "stretch" { 0.8f64 } else { 0.93 };
             row.record.result.traces = BTreeMap::from([
-                ("energy".to_string(), iterations.iter().map(|i| factor * (6.0 + 900.0 * fall.powf(*i))).collect()),
-                ("gradient_norm".to_string(), iterations.iter().map(|i| factor * 50.0 * fall.powf(2.0 * i)).collect()),
-                ("phase".to_string(), iterations.iter().map(|i| f64::from(u8::from(*i >= 8.0))).collect()),
+                (
+                    "energy".to_string(),
+                    iterations
+                        .iter()
+                        .map(|i| factor * (6.0 + 900.0 * fall.powf(*i)))
+                        .collect(),
+                ),
+                (
+                    "gradient_norm".to_string(),
+                    iterations.iter().map(|i| factor * 50.0 * fall.powf(2.0 * i)).collect(),
+                ),
+                (
+                    "phase".to_string(),
+                    iterations.iter().map(|i| f64::from(u8::from(*i >= 8.0))).collect(),
+                ),
                 ("iteration".to_string(), iterations),
             ]);
             rows.push(row);
@@ -201,7 +219,11 @@ pub fn published() -> Published {
     Published {
         source: "Table 1 of the paper".into(),
         machine: Some("one core of a 3.4 GHz processor".into()),
-        rows: vec![row("dirichlet", 3.2, 200.1, 47), row("stretch", 2.9, 30.5, 98), row("lscm", 6.7, 652.1, 1018)],
+        rows: vec![
+            row("dirichlet", 3.2, 200.1, 47),
+            row("stretch", 2.9, 30.5, 98),
+            row("lscm", 6.7, 652.1, 1018),
+        ],
     }
 }
 
@@ -230,7 +252,9 @@ pub fn experiment() -> Experiment {
             name: "distortion".into(),
             title: Some("Distortion by energy".into()),
             rows: vec!["model".into(), "energy".into()],
-            columns: ["d_aa", "d_ma", "scaled_jacobian_min", "inverted", "seconds"].map(String::from).to_vec(),
+            columns: ["d_aa", "d_ma", "scaled_jacobian_min", "inverted", "seconds"]
+                .map(String::from)
+                .to_vec(),
             condition: Condition::new(),
             published: Some(published()),
         }],
@@ -261,8 +285,20 @@ pub fn experiment() -> Experiment {
             condition: condition(&[("energy", &[json!("stretch")])]),
             stop: Some("converged".into()),
             bounds: BTreeMap::from([
-                ("d_ma".to_string(), Bound { max: Some(20.0), ..Bound::default() }),
-                ("inverted".to_string(), Bound { equals: Some(0.0), ..Bound::default() }),
+                (
+                    "d_ma".to_string(),
+                    Bound {
+                        max: Some(20.0),
+                        ..Bound::default()
+                    },
+                ),
+                (
+                    "inverted".to_string(),
+                    Bound {
+                        equals: Some(0.0),
+                        ..Bound::default()
+                    },
+                ),
             ]),
             comparisons: vec![Comparison {
                 metric: "d_ma".into(),
@@ -311,7 +347,9 @@ pub fn mesh(size: u32, twist: f64) -> Vec<u8> {
     let at = |i: u32, j: u32, k: u32| (k * (size + 1) + j) * (size + 1) + i;
     let mut state = 12_345u64;
     let mut random = move || {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
         (state >> 40) as f64 / f64::from(1 << 24) - 0.5
     };
     let mut source = Vec::new();
@@ -332,7 +370,11 @@ pub fn mesh(size: u32, twist: f64) -> Vec<u8> {
                 ];
                 let (sine, cosine) = (twist * ball[2]).sin_cos();
                 source.push(place);
-                image.push([cosine * ball[0] - sine * ball[1], sine * ball[0] + cosine * ball[1], ball[2]]);
+                image.push([
+                    cosine * ball[0] - sine * ball[1],
+                    sine * ball[0] + cosine * ball[1],
+                    ball[2],
+                ]);
             }
         }
     }
@@ -348,16 +390,22 @@ pub fn mesh(size: u32, twist: f64) -> Vec<u8> {
         }
     }
     let determinant = |points: &[[f64; 3]], cell: &[u32; 4]| {
-        let edge = |index: usize| [0, 1, 2].map(|axis| points[cell[index] as usize][axis] - points[cell[0] as usize][axis]);
+        let edge =
+            |index: usize| [0, 1, 2].map(|axis| points[cell[index] as usize][axis] - points[cell[0] as usize][axis]);
         let (a, b, c) = (edge(1), edge(2), edge(3));
         a[0] * (b[1] * c[2] - b[2] * c[1]) - a[1] * (b[0] * c[2] - b[2] * c[0]) + a[2] * (b[0] * c[1] - b[1] * c[0])
     };
-    let determinants: Vec<f64> = cells.iter().map(|cell| determinant(&image, cell) / determinant(&source, cell)).collect();
+    let determinants: Vec<f64> = cells
+        .iter()
+        .map(|cell| determinant(&image, cell) / determinant(&source, cell))
+        .collect();
     let edges = |points: &[[f64; 3]], cell: &[u32; 4]| {
         let mut sum = 0.0;
         for i in 0..4 {
             for j in 0..i {
-                sum += (0..3).map(|axis| (points[cell[i] as usize][axis] - points[cell[j] as usize][axis]).powi(2)).sum::<f64>();
+                sum += (0..3)
+                    .map(|axis| (points[cell[i] as usize][axis] - points[cell[j] as usize][axis]).powi(2))
+                    .sum::<f64>();
             }
         }
         sum
@@ -367,11 +415,25 @@ pub fn mesh(size: u32, twist: f64) -> Vec<u8> {
         .zip(&determinants)
         .map(|(cell, det)| edges(&image, cell) / edges(&source, cell) / det.abs().max(1e-9).powf(2.0 / 3.0))
         .collect();
-    let volume: Vec<f64> = determinants.iter().map(|det| det.abs().max(1e-12).max(1.0 / det.abs().max(1e-12))).collect();
-    let density: Vec<f64> = angle.iter().zip(&volume).map(|(angle, volume)| angle * angle + volume).collect();
-    let jacobian: Vec<f64> = determinants.iter().zip(&angle).map(|(det, angle)| det.signum() / angle).collect();
-    let inverted: Vec<f64> =
-        determinants.iter().enumerate().map(|(index, det)| f64::from(u8::from(*det <= 0.0 || index % 977 == 5))).collect();
+    let volume: Vec<f64> = determinants
+        .iter()
+        .map(|det| det.abs().max(1e-12).max(1.0 / det.abs().max(1e-12)))
+        .collect();
+    let density: Vec<f64> = angle
+        .iter()
+        .zip(&volume)
+        .map(|(angle, volume)| angle * angle + volume)
+        .collect();
+    let jacobian: Vec<f64> = determinants
+        .iter()
+        .zip(&angle)
+        .map(|(det, angle)| det.signum() / angle)
+        .collect();
+    let inverted: Vec<f64> = determinants
+        .iter()
+        .enumerate()
+        .map(|(index, det)| f64::from(u8::from(*det <= 0.0 || index % 977 == 5)))
+        .collect();
     vtu::write(
         &image,
         Cells {

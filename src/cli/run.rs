@@ -1,17 +1,17 @@
 //! `vargeo run`: every job of an experiment that is not stored yet, then the report.
 
+use super::input::Input;
 use super::{Exit, progress};
-use crate::experiment::diagnostic::{Diagnostic, render};
 use crate::experiment::file::Experiment;
 use crate::experiment::grid;
 use crate::experiment::nearest::suggestion;
-use crate::experiment::plan::{Lookup, Plan};
+use crate::experiment::plan::Plan;
 use crate::experiment::record::{Record, Status};
 use crate::report::{self, Row};
 use crate::run::interrupt::Interrupt;
 use crate::run::store::{MESH, Store};
 use crate::run::{Finished, Options, Program, Run, run_plan};
-use std::io::{IsTerminal, Write};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// Computes every job of an experiment that is not stored yet, and writes tables, plots, pictures and the page.
@@ -20,20 +20,9 @@ use std::path::{Path, PathBuf};
 #[derive(clap::Args)]
 pub struct Arguments {
     #[command(flatten)]
-    planning: Planning,
+    input: Input,
     #[command(flatten)]
     running: Running,
-}
-
-/// Which jobs there are.
-#[derive(clap::Args)]
-pub(super) struct Planning {
-    /// The experiment file.
-    #[arg(value_name = "FILE")]
-    file: PathBuf,
-    /// A folder where model files are looked for too, after the experiment file's own.
-    #[arg(long, value_name = "DIR")]
-    models: Vec<PathBuf>,
 }
 
 /// How they are computed.
@@ -61,7 +50,7 @@ pub(super) struct Running {
 
 /// Runs, then reports.
 pub fn execute(arguments: Arguments) -> Exit {
-    match plan(&arguments.planning).and_then(|plan| run(&plan, &arguments.running)) {
+    match arguments.input.plan().and_then(|plan| run(&plan, &arguments.running)) {
         Ok(done) => done.exit,
         Err(exit) => exit,
     }
@@ -73,28 +62,6 @@ pub(super) struct Done {
     pub(super) rows: Vec<Row>,
     /// Absent when the run was interrupted.
     pub(super) written: Option<report::Written>,
-}
-
-/// Reads the experiment and unfolds it; all that is wrong goes to standard error.
-pub(super) fn plan(planning: &Planning) -> Result<Plan, Exit> {
-    let lookup = Lookup {
-        folders: planning.models.clone(),
-    };
-    let read = Experiment::read(&planning.file, crate::method::methods());
-    let planned = read.and_then(|experiment| {
-        tell(&experiment.origin.warnings);
-        Plan::new(experiment, &lookup)
-    });
-    planned.map_err(|diagnostics| {
-        tell(&diagnostics);
-        Exit::FileWrong
-    })
-}
-
-fn tell(diagnostics: &[Diagnostic]) {
-    if !diagnostics.is_empty() {
-        eprint!("{}", render(diagnostics, std::io::stderr().is_terminal()));
-    }
 }
 
 /// Runs what is missing and writes the report.

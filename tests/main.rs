@@ -1,13 +1,16 @@
 //! One test binary; a file a property.
 
+mod connectivity;
 mod damaged_files;
 mod energies;
 mod experiment_files;
 mod floors;
 mod formats;
 mod gate;
+mod generators;
 mod kernels;
 mod mapping;
+mod mesh_checks;
 mod page;
 mod rates;
 mod reports;
@@ -15,9 +18,6 @@ mod runner;
 mod sample;
 mod sparse;
 mod store;
+mod tiny_method;
 mod volume_map;
 mod volume_map_feasibility;
-mod tiny_method;
-mod connectivity;
-mod generators;
-mod mesh_checks;

@@ -2,6 +2,7 @@
 
 mod connectivity;
 mod damaged_files;
+mod distortion;
 mod energies;
 mod experiment_files;
 mod floors;
@@ -11,6 +12,7 @@ mod generators;
 mod kernels;
 mod mapping;
 mod mesh_checks;
+mod optimizers;
 mod page;
 mod rates;
 mod reports;

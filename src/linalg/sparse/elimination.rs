@@ -9,10 +9,11 @@ pub(super) const ROOT: u32 = u32::MAX;
 
 /// A child's front is merged into its parent's if the merged front has at most so many columns of unknowns and at most
 /// this share of explicit zeros. Fewer, larger fronts run faster although they do more arithmetic.
-const RELAXATION: [(usize, f64); 4] = [(12, 0.8), (32, 0.4), (96, 0.12), (usize::MAX, 0.04)];
+const RELAXATION: [(usize, f64); 4] = [(18, 0.8), (60, 0.4), (200, 0.12), (usize::MAX, 0.04)];
 
-/// Branches with less than this share of all arithmetic are factorized by one thread.
-const BRANCH_SHARE: f64 = 1.0 / 32.0;
+/// Branches with less than this share of all arithmetic are factorized one after another: every branch under way holds
+/// working memory of its own, and large fronts keep all threads busy anyway.
+const BRANCH_SHARE: f64 = 0.2;
 /// Nor is a branch below this many operations worth sharing out.
 const BRANCH_OPERATIONS: f64 = 2e6;
 

@@ -15,7 +15,7 @@ const PATIENCE: usize = 60;
 /// Most passes on one level.
 const PASSES: usize = 10;
 /// Regions grown on the coarsest graph.
-const GROWN: usize = 6;
+const GROWN: usize = 3;
 
 /// Where a vertex lies.
 pub(super) const SEPARATOR: u8 = 2;

@@ -257,7 +257,7 @@ impl<'a> File<'a> {
                     _ => {}
                 },
                 Event::Text(text) if array_open && inner == 0 => {
-                    let blank = text.as_ref().trim_ascii().is_empty();
+                    let blank = text.trim_ascii().is_empty();
                     if let Some(array) = file.arrays.last_mut()
                         && !blank
                         && array.end == array.start

@@ -17,6 +17,7 @@ use std::collections::BinaryHeap;
 /// A convex polyhedron around the origin.
 #[derive(Debug)]
 pub struct Polyhedron {
+    /// With its article.
     pub name: &'static str,
     pub corners: &'static [[f64; 3]],
     /// Corners of each side, counter-clockwise seen from outside.
@@ -25,7 +26,7 @@ pub struct Polyhedron {
 
 /// The cube `[-1, 1]^3`; corner `x + 2 y + 4 z` with bits for the signs.
 pub const CUBE: Polyhedron = Polyhedron {
-    name: "cube",
+    name: "a cube",
     corners: &[
         [-1.0, -1.0, -1.0],
         [1.0, -1.0, -1.0],
@@ -48,7 +49,7 @@ pub const CUBE: Polyhedron = Polyhedron {
 
 /// The octahedron with corners at distance 1 on the axes.
 pub const OCTAHEDRON: Polyhedron = Polyhedron {
-    name: "octahedron",
+    name: "an octahedron",
     corners: &[
         [1.0, 0.0, 0.0],
         [-1.0, 0.0, 0.0],
@@ -71,7 +72,7 @@ pub const OCTAHEDRON: Polyhedron = Polyhedron {
 
 /// The regular tetrahedron in the cube `[-1, 1]^3`.
 pub const TETRAHEDRON: Polyhedron = Polyhedron {
-    name: "tetrahedron",
+    name: "a tetrahedron",
     corners: &[[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]],
     sides: &[&[0, 1, 2], &[0, 2, 3], &[0, 3, 1], &[1, 3, 2]],
 };
@@ -159,9 +160,34 @@ struct Layout<'a> {
     paths: Vec<([usize; 2], Vec<u32>)>,
     /// Whether a vertex is a corner or on a path.
     taken: Vec<bool>,
+    /// Whether a vertex is next to a corner, next to a path.
+    near: Vec<[bool; 2]>,
+    /// How many times longer a step counts that ends next to a corner or to a path: keeps room for later paths.
+    detour: [f64; 2],
 }
 
-impl Layout<'_> {
+impl<'a> Layout<'a> {
+    fn new(polyhedron: &'a Polyhedron, sheet: &'a Sheet<'a>, corners: &[u32], detour: [f64; 2]) -> Self {
+        let mut taken = vec![false; sheet.points.len()];
+        let mut near = vec![[false; 2]; sheet.points.len()];
+        for &corner in corners {
+            taken[corner as usize] = true;
+            sheet
+                .ring(corner)
+                .iter()
+                .for_each(|&vertex| near[vertex as usize][0] = true);
+        }
+        Self {
+            polyhedron,
+            sheet,
+            corners: corners.to_vec(),
+            paths: Vec::new(),
+            taken,
+            near,
+            detour,
+        }
+    }
+
     /// The path that leaves `from` towards `to`, in that direction, if it is laid.
     fn path(&self, from: usize, to: usize) -> Option<Vec<u32>> {
         let (edge, path) = self
@@ -230,7 +256,12 @@ impl Layout<'_> {
                         continue;
                     }
                     let [a, b] = [vertex, next].map(|v| self.sheet.points[v as usize]);
-                    let reached = f64::from_bits(bits) + length(subtract(a, b));
+                    let [corner, path] = self.near[next as usize];
+                    let weight = match next == end {
+                        true => 1.0,
+                        false => 1.0 + f64::from(corner) * self.detour[0] + f64::from(path) * self.detour[1],
+                    };
+                    let reached = f64::from_bits(bits) + weight * length(subtract(a, b));
                     if reached < distance[next as usize] {
                         distance[next as usize] = reached;
                         previous[next as usize] = vertex;
@@ -248,6 +279,26 @@ impl Layout<'_> {
         }
         path.reverse();
         Some((distance[end as usize], path))
+    }
+
+    /// The path without the detours around a single triangle that the clearance can cause; two steps along a triangle
+    /// whose third edge joins path vertices would lie on one line in the target, and the triangle with them.
+    fn straightened(&self, mut path: Vec<u32>) -> Vec<u32> {
+        let mut at = 1;
+        while at + 1 < path.len() {
+            let ends = [path[at - 1], path[at + 1]];
+            let cut = |&triangle: &u32| {
+                ends.iter()
+                    .all(|end| self.sheet.triangles[triangle as usize].contains(end))
+            };
+            if self.sheet.around.row(path[at] as usize).iter().any(cut) {
+                path.remove(at);
+                at = at.max(2) - 1;
+            } else {
+                at += 1;
+            }
+        }
+        path
     }
 
     /// Lays all edges: first a tree that reaches every corner, then the rest, always the shortest next. In the disc that
@@ -283,8 +334,14 @@ impl Layout<'_> {
             let Some((_, edge, path)) = best else {
                 return Err("no free path of mesh edges is left between two corners".to_string());
             };
+            let path = self.straightened(path);
             for &vertex in &path {
                 self.taken[vertex as usize] = true;
+                for &triangle in self.sheet.around.row(vertex as usize) {
+                    self.sheet.triangles[triangle as usize]
+                        .iter()
+                        .for_each(|&v| self.near[v as usize][1] = true);
+                }
             }
             edge.iter().for_each(|&corner| reached[corner] = true);
             self.paths.push((edge, path));
@@ -359,11 +416,11 @@ pub fn lay(polyhedron: &Polyhedron, points: &[[f64; 3]], triangles: &[[u32; 3]])
                 Some(genus) => format!("has genus {genus}"),
                 None => "is not an oriented manifold".to_string(),
             };
-            return Err(format!("the boundary {what}, but a {name} has genus 0; {mend}"));
+            return Err(format!("the boundary {what}, but {name} has genus 0; {mend}"));
         }
         parts => {
             return Err(format!(
-                "the boundary has {} parts, but a {name} has one; {mend}",
+                "the boundary has {} parts, but {name} has one; {mend}",
                 parts.len()
             ));
         }
@@ -373,19 +430,31 @@ pub fn lay(polyhedron: &Polyhedron, points: &[[f64; 3]], triangles: &[[u32; 3]])
         triangles,
         around: connectivity::incidence(triangles, points.len()),
     };
-    let corners = corner_vertices(polyhedron, &sheet)?;
-    let mut taken = vec![false; points.len()];
-    corners.iter().for_each(|&vertex| taken[vertex as usize] = true);
-    let mut layout = Layout {
-        polyhedron,
-        sheet: &sheet,
-        corners,
-        paths: Vec::new(),
-        taken,
+    // First the nearest corners and plain shortest paths; where they leave no room, roomier corners, then paths that
+    // keep ever more away from each other.
+    let plans = [
+        (1, [0.0, 0.0]),
+        (2, [0.0, 0.0]),
+        (2, [4.0, 1.0]),
+        (2, [16.0, 4.0]),
+        (1, [4.0, 1.0]),
+        (0, [0.0, 0.0]),
+    ];
+    let mut attempts = plans.iter().map(|&(spare, detour)| {
+        let corners = corner_vertices(polyhedron, &sheet, spare)?;
+        let mut layout = Layout::new(polyhedron, &sheet, &corners, detour);
+        layout.route()?;
+        let side_of = layout.patches()?;
+        Ok((layout, side_of))
+    });
+    let refuse = |reason: String| format!("the boundary cannot be laid onto {name}: {reason}; refine it, or {mend}");
+    let first: Result<_, String> = attempts
+        .next()
+        .unwrap_or_else(|| Err("no attempt was made".to_string()));
+    let (layout, side_of) = match first {
+        Ok(found) => found,
+        Err(reason) => attempts.find_map(Result::ok).ok_or_else(|| refuse(reason))?,
     };
-    let refuse = |reason: String| format!("the boundary cannot be laid onto a {name}: {reason}; refine it, or {mend}");
-    layout.route().map_err(refuse)?;
-    let side_of = layout.patches().map_err(refuse)?;
 
     let mut positions = vec![[f64::NAN; 3]; points.len()];
     for ([from, to], path) in &layout.paths {
@@ -420,30 +489,30 @@ pub fn lay(polyhedron: &Polyhedron, points: &[[f64; 3]], triangles: &[[u32; 3]])
 }
 
 /// The vertices nearest to the polyhedron's corners, after the surface's bounding box and the polyhedron's have been
-/// scaled to the same cube. No two of them are neighbours, and each has room for the edges that meet there.
-fn corner_vertices(polyhedron: &Polyhedron, sheet: &Sheet) -> Result<Vec<u32>, String> {
+/// scaled to the same cube. No two of them are neighbours, and each has at least `spare` neighbours more than edges.
+fn corner_vertices(polyhedron: &Polyhedron, sheet: &Sheet, spare: usize) -> Result<Vec<u32>, String> {
     let Some([low, high]) = bounding_box(sheet.points) else {
         return Err("the mesh has no boundary".to_string());
     };
     let mut chosen: Vec<u32> = Vec::new();
     let mut near = vec![false; sheet.points.len()];
     for (corner, wanted) in polyhedron.corners.iter().enumerate() {
-        let needed = polyhedron.rotation(corner).len();
+        let needed = polyhedron.rotation(corner).len() + spare;
         let mut best = (f64::INFINITY, NONE);
         for (vertex, point) in sheet.points.iter().enumerate() {
             let offset: [f64; 3] = std::array::from_fn(|axis| {
                 let extent = (high[axis] - low[axis]).max(f64::MIN_POSITIVE);
                 (2.0 * point[axis] - low[axis] - high[axis]) / extent - wanted[axis]
             });
-            let room = sheet.around.row(vertex).len() >= needed.max(4);
+            let room = sheet.around.row(vertex).len() >= needed;
             if room && !near[vertex] && dot(offset, offset) < best.0 {
                 best = (dot(offset, offset), vertex as u32);
             }
         }
         if best.1 == NONE {
-            let (count, name) = (sheet.points.len(), polyhedron.name);
             return Err(format!(
-                "{count} boundary vertices are too few for a {name}; refine the mesh"
+                "{} boundary vertices leave no room for its corners",
+                sheet.points.len()
             ));
         }
         chosen.push(best.1);

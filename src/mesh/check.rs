@@ -270,9 +270,9 @@ fn shape_and_orientation(mesh: &mut TetrahedralMesh, problems: &mut Problems) {
     let (vertices, total) = (mesh.points.len(), mesh.cells.len());
     let determinants: Vec<f64> = mesh.cells.iter().map(|&cell| determinant(mesh.corners(cell))).collect();
     let flat = |cell: usize| determinants[cell].abs() / 6.0 <= FLAT * longest(mesh.corners(mesh.cells[cell])).powi(3);
-    let flat: Vec<usize> = (0..total).filter(|&cell| flat(cell)).collect();
-    let degenerate = !flat.is_empty();
-    problems.add("degenerate-cell", Severity::Error, Element::Cell, flat.into_iter(), |count, first| {
+    let is_flat: Vec<bool> = (0..total).map(flat).collect();
+    let flat = (0..total).filter(|&cell| is_flat[cell]);
+    problems.add("degenerate-cell", Severity::Error, Element::Cell, flat, |count, first| {
         format!(
             "{count} of {total} tetrahedra have no volume, the first is tetrahedron {first} with vertices {:?}; remove \
              or remesh them",
@@ -294,7 +294,17 @@ fn shape_and_orientation(mesh: &mut TetrahedralMesh, problems: &mut Problems) {
             ),
         });
     }
-    let negative: Vec<usize> = (0..total).filter(|&cell| determinants[cell] < 0.0).collect();
+    let signs = (0..total).filter(|&cell| !is_flat[cell]);
+    let mostly_reversed = 2 * signs.clone().filter(|&cell| determinants[cell] < 0.0).count() > signs.count();
+    // The sign of a flat tetrahedron is noise; it goes with the majority.
+    let is_negative = |cell: usize| {
+        if is_flat[cell] {
+            mostly_reversed
+        } else {
+            determinants[cell] < 0.0
+        }
+    };
+    let negative: Vec<usize> = (0..total).filter(|&cell| is_negative(cell)).collect();
     let turn = |mesh: &mut TetrahedralMesh, facets: &mut Facets<4>| {
         for &cell in &negative {
             mesh.cells[cell].swap(2, 3);
@@ -321,17 +331,16 @@ fn shape_and_orientation(mesh: &mut TetrahedralMesh, problems: &mut Problems) {
                 }
             },
         );
-    } else if !degenerate {
+    } else {
         // The order of the vertices was sound and the positions are not: leave the cells as they are.
-        let before = negative.len();
         let (count, first) = (folded.len(), folded[0]);
         turn(mesh, &mut facets);
         // A mesh that is reversed as a whole shows its few positive tetrahedra as the inverted ones.
-        let inverted = before.min(total - before);
-        let reversed = before > total - before;
-        let first = (0..total)
-            .find(|&cell| (determinants[cell] < 0.0) != reversed)
-            .unwrap_or(first);
+        let mut odd = (0..total)
+            .filter(|&cell| is_negative(cell) != mostly_reversed)
+            .peekable();
+        let first = odd.peek().copied().unwrap_or(first);
+        let inverted = odd.count();
         let (kind, message) = if inverted == 0 {
             (
                 "overlap",
@@ -392,27 +401,6 @@ fn shape_and_orientation(mesh: &mut TetrahedralMesh, problems: &mut Problems) {
             )
         },
     );
-}
-
-/// Checks a tetrahedral mesh for use in a computation: returns it with its reversed tetrahedra turned round, and notices
-/// for the reader.
-///
-/// # Errors
-/// All errors of [`tetrahedra`], one a line.
-pub fn usable(mut mesh: TetrahedralMesh) -> Result<(TetrahedralMesh, Vec<String>), String> {
-    let problems = tetrahedra(&mut mesh);
-    let of = |error: bool| {
-        problems
-            .iter()
-            .filter(move |problem| (problem.severity == Severity::Error) == error)
-            .map(|p| p.message.clone())
-    };
-    let errors: Vec<String> = of(true).collect();
-    if errors.is_empty() {
-        Ok((mesh, of(false).collect()))
-    } else {
-        Err(errors.join("\n"))
-    }
 }
 
 /// Checks a triangle surface. Open boundaries and separate parts are no problems; they are in the summary. Errors come

@@ -4,6 +4,8 @@
 //! A generated shape is checked: every boundary triangle has positive area on its side, seen from outside. Positions from
 //! files are only checked to be complete and finite; whether a map onto them can be free of folds is for the method.
 
+mod harmonic;
+mod layout;
 pub mod list;
 pub mod polyhedron;
 

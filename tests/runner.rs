@@ -192,6 +192,7 @@ fn plan(settings: &[Value], limits: Limits, timing: Timing) -> Plan {
             plots: Vec::new(),
             rates: Vec::new(),
             expectations: Vec::new(),
+            origin: Default::default(),
         },
         notices: Vec::new(),
     }

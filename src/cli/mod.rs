@@ -2,12 +2,15 @@
 
 mod explain;
 mod input;
+mod check;
+mod compare;
 mod job;
 mod list;
 mod mesh;
 mod new;
 mod plan;
 mod progress;
+mod report;
 mod run;
 mod schema;
 mod store;
@@ -48,6 +51,9 @@ enum Command {
     Run(run::Arguments),
     Plan(plan::Arguments),
     New(new::Arguments),
+    Check(check::Arguments),
+    Report(report::Arguments),
+    Compare(compare::Arguments),
     List(list::Arguments),
     Schema(schema::Arguments),
     Explain(explain::Arguments),
@@ -77,6 +83,9 @@ pub fn main() -> ExitCode {
         Command::New(arguments) => new::execute(arguments),
         Command::Schema(arguments) => schema::execute(arguments),
         Command::Explain(arguments) => explain::execute(arguments),
+        Command::Check(arguments) => check::execute(arguments),
+        Command::Report(arguments) => report::execute(arguments),
+        Command::Compare(arguments) => compare::execute(arguments),
         Command::List(arguments) => list::execute(arguments),
         Command::Mesh(arguments) => mesh::execute(arguments),
         Command::Store(arguments) => store::execute(arguments),

@@ -122,6 +122,27 @@ pub fn stored(store: &Store, job: &PlannedJob, effort: Effort) -> Lookup {
     }
 }
 
+/// The record of a job whose optional model is missing. It has no key: nothing was resolved.
+pub fn skipped(plan: &Plan, job: &PlannedJob, effort: Effort) -> Record {
+    let experiment = &plan.experiment;
+    let reason = job.missing.clone().unwrap_or_else(|| "its model is missing".into());
+    Record {
+        key: Key(String::new()),
+        job: Job {
+            record_schema: crate::experiment::record::RECORD_SCHEMA,
+            method: experiment.method.name().into(),
+            method_version: experiment.method.version(),
+            model: BTreeMap::new(),
+            settings: serde_json::Value::Object(serde_json::Map::new()),
+        },
+        result: JobResult {
+            status: Status::Skipped,
+            ..failure("missing-model", reason)
+        },
+        measurement: unmeasured(effort, &job.inputs),
+    }
+}
+
 /// Runs every job of a plan that the store does not hold, and returns a record for each.
 ///
 /// Errors only when the store cannot be written at all. Call it from a thread that lives as long as the run: the job
@@ -207,7 +228,7 @@ impl Pool<'_> {
         let mut finished = Vec::new();
         for (index, (job, found)) in jobs.iter().zip(found).enumerate() {
             let Some((key, resolved)) = &job.resolved else {
-                finished.push((index, self.skipped(job), false));
+                finished.push((index, skipped(self.plan, job, self.effort), false));
                 continue;
             };
             match found {
@@ -248,27 +269,6 @@ impl Pool<'_> {
         warnings.into_iter().for_each(|text| self.warn(text));
         for (index, record, cached) in finished {
             self.finish(index, record, cached);
-        }
-    }
-
-    /// The record of a job whose optional model is missing. It has no key: nothing was resolved.
-    fn skipped(&self, job: &PlannedJob) -> Record {
-        let experiment = &self.plan.experiment;
-        let reason = job.missing.clone().unwrap_or_else(|| "its model is missing".into());
-        Record {
-            key: Key(String::new()),
-            job: Job {
-                record_schema: crate::experiment::record::RECORD_SCHEMA,
-                method: experiment.method.name().into(),
-                method_version: experiment.method.version(),
-                model: BTreeMap::new(),
-                settings: serde_json::Value::Object(serde_json::Map::new()),
-            },
-            result: JobResult {
-                status: Status::Skipped,
-                ..failure("missing-model", reason)
-            },
-            measurement: unmeasured(self.effort, &job.inputs),
         }
     }
 

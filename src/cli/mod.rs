@@ -1,5 +1,6 @@
 //! The command line: one command a file, each with its arguments and its `execute`.
 
+mod check;
 mod explain;
 mod input;
 mod job;
@@ -8,6 +9,7 @@ mod mesh;
 mod new;
 mod plan;
 mod progress;
+mod report;
 mod run;
 mod schema;
 mod store;
@@ -46,6 +48,8 @@ const EXIT_CODES: &str = "Exit codes: 0 all well, 1 an expectation was not met, 
 #[derive(Subcommand)]
 enum Command {
     Run(run::Arguments),
+    Check(check::Arguments),
+    Report(report::Arguments),
     Plan(plan::Arguments),
     New(new::Arguments),
     List(list::Arguments),
@@ -73,6 +77,8 @@ pub fn main() -> ExitCode {
     };
     let exit = match arguments.command {
         Command::Run(arguments) => run::execute(arguments),
+        Command::Check(arguments) => check::execute(arguments),
+        Command::Report(arguments) => report::execute(arguments),
         Command::Plan(arguments) => plan::execute(arguments),
         Command::New(arguments) => new::execute(arguments),
         Command::Schema(arguments) => schema::execute(arguments),

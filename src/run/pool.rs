@@ -8,9 +8,10 @@ use super::job::{damage, memory_reason};
 use super::protocol::{Effort, Message, Request};
 use super::provenance;
 use super::store::{Lookup, Store, StoreError};
+use crate::experiment::file::Experiment;
 use crate::experiment::job::{Job, Key};
 use crate::experiment::plan::{Plan, PlannedJob};
-use crate::experiment::record::{JobResult, Record, Status};
+use crate::experiment::record::{JobResult, RECORD_SCHEMA, Record, Status};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, VecDeque};
 use std::ffi::OsString;
@@ -149,6 +150,26 @@ pub fn run_plan(plan: &Plan, options: &Options, listener: &mut dyn Listener) -> 
     Ok(run)
 }
 
+/// The record of a job whose optional model is missing. It has no key: nothing was resolved.
+pub fn skipped(experiment: &Experiment, job: &PlannedJob, effort: Effort) -> Record {
+    let reason = job.missing.clone().unwrap_or_else(|| "its model is missing".into());
+    Record {
+        key: Key(String::new()),
+        job: Job {
+            record_schema: RECORD_SCHEMA,
+            method: experiment.method.name().into(),
+            method_version: experiment.method.version(),
+            model: BTreeMap::new(),
+            settings: serde_json::Value::Object(serde_json::Map::new()),
+        },
+        result: JobResult {
+            status: Status::Skipped,
+            ..failure("missing-model", reason)
+        },
+        measurement: unmeasured(effort, &job.inputs),
+    }
+}
+
 struct Pool<'a> {
     plan: &'a Plan,
     options: &'a Options,
@@ -207,7 +228,7 @@ impl Pool<'_> {
         let mut finished = Vec::new();
         for (index, (job, found)) in jobs.iter().zip(found).enumerate() {
             let Some((key, resolved)) = &job.resolved else {
-                finished.push((index, self.skipped(job), false));
+                finished.push((index, skipped(&self.plan.experiment, job, effort), false));
                 continue;
             };
             match found {
@@ -248,27 +269,6 @@ impl Pool<'_> {
         warnings.into_iter().for_each(|text| self.warn(text));
         for (index, record, cached) in finished {
             self.finish(index, record, cached);
-        }
-    }
-
-    /// The record of a job whose optional model is missing. It has no key: nothing was resolved.
-    fn skipped(&self, job: &PlannedJob) -> Record {
-        let experiment = &self.plan.experiment;
-        let reason = job.missing.clone().unwrap_or_else(|| "its model is missing".into());
-        Record {
-            key: Key(String::new()),
-            job: Job {
-                record_schema: crate::experiment::record::RECORD_SCHEMA,
-                method: experiment.method.name().into(),
-                method_version: experiment.method.version(),
-                model: BTreeMap::new(),
-                settings: serde_json::Value::Object(serde_json::Map::new()),
-            },
-            result: JobResult {
-                status: Status::Skipped,
-                ..failure("missing-model", reason)
-            },
-            measurement: unmeasured(self.effort, &job.inputs),
         }
     }
 

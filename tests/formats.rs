@@ -306,6 +306,49 @@ impl Bytes {
 
 const CORNERS: [f64; 12] = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.5, 0.0, 0.0, 0.0, 1.0];
 
+fn gmsh_2_binary(big: bool) -> Vec<u8> {
+    let mut file = Bytes::new(big);
+    file.text("$MeshFormat\n2.2 1 8\n")
+        .ints(&[1])
+        .text("\n$EndMeshFormat\n$Nodes\n4\n");
+    for (row, point) in CORNERS.chunks(3).enumerate() {
+        file.ints(&[[10, 20, 7, 40][row]]).reals(point);
+    }
+    file.text("\n$EndNodes\n$Elements\n2\n")
+        .ints(&[15, 1, 2, 1, 0, 1, 10])
+        .ints(&[4, 1, 2, 5, 9, 1, 10, 20, 7, 40]);
+    file.text("\n$EndElements\n$NodeData\n1\n\"depth\"\n1\n0\n3\n0\n1\n4\n");
+    for (node, value) in [(10, 1.0), (20, 2.0), (7, 3.0), (40, 4.0)] {
+        file.ints(&[node]).reals(&[value]);
+    }
+    file.text("\n$EndNodeData\n");
+    file.bytes
+}
+
+fn gmsh_4_binary(big: bool) -> Vec<u8> {
+    let mut file = Bytes::new(big);
+    file.text("$MeshFormat\n4.1 1 8\n")
+        .ints(&[1])
+        .text("\n$EndMeshFormat\n$Entities\n")
+        .sizes(&[0, 0, 0, 1]);
+    file.ints(&[1])
+        .reals(&[0.0; 6])
+        .sizes(&[1])
+        .ints(&[9])
+        .sizes(&[0])
+        .text("\n$EndEntities\n$Nodes\n");
+    file.sizes(&[1, 4, 7, 40])
+        .ints(&[3, 1, 0])
+        .sizes(&[4, 10, 20, 7, 40])
+        .reals(&CORNERS)
+        .text("\n$EndNodes\n$Elements\n");
+    file.sizes(&[1, 1, 5, 5])
+        .ints(&[3, 1, 4])
+        .sizes(&[1, 5, 10, 20, 7, 40])
+        .text("\n$EndElements\n");
+    file.bytes
+}
+
 #[test]
 fn gmsh_in_both_versions_encodings_and_byte_orders() {
     // Numbers of nodes with gaps and out of order, a physical group, a line that is left out, and data.
@@ -319,7 +362,10 @@ fn gmsh_in_both_versions_encodings_and_byte_orders() {
         [field("reference", 1, vec![9.0]), field("quality", 1, vec![0.75])]
     );
     assert!(
-        content.notices.iter().any(|notice| notice.contains("1 lines left out")),
+        content
+            .notices
+            .iter()
+            .any(|notice| notice.contains("lines left out: 1")),
         "{:?}",
         content.notices
     );
@@ -334,46 +380,10 @@ fn gmsh_in_both_versions_encodings_and_byte_orders() {
     assert_eq!(content.point_data, [field("depth", 1, vec![1.0, 2.0, 3.0, 4.0])]);
 
     for big in [false, true] {
-        let mut file = Bytes::new(big);
-        file.text("$MeshFormat\n2.2 1 8\n")
-            .ints(&[1])
-            .text("\n$EndMeshFormat\n$Nodes\n4\n");
-        for (row, point) in CORNERS.chunks(3).enumerate() {
-            file.ints(&[[10, 20, 7, 40][row]]).reals(point);
-        }
-        file.text("\n$EndNodes\n$Elements\n2\n")
-            .ints(&[15, 1, 2, 1, 0, 1, 10])
-            .ints(&[4, 1, 2, 5, 9, 1, 10, 20, 7, 40]);
-        file.text("\n$EndElements\n$NodeData\n1\n\"depth\"\n1\n0\n3\n0\n1\n4\n");
-        for (node, value) in [(10, 1.0), (20, 2.0), (7, 3.0), (40, 4.0)] {
-            file.ints(&[node]).reals(&[value]);
-        }
-        file.text("\n$EndNodeData\n");
-        let content = assert_tetrahedron("t.msh", &file.bytes);
+        let content = assert_tetrahedron("t.msh", &gmsh_2_binary(big));
         assert_eq!(content.cell_data, [field("reference", 1, vec![9.0])]);
         assert_eq!(content.point_data[0].values, [1.0, 2.0, 3.0, 4.0]);
-
-        let mut file = Bytes::new(big);
-        file.text("$MeshFormat\n4.1 1 8\n")
-            .ints(&[1])
-            .text("\n$EndMeshFormat\n$Entities\n")
-            .sizes(&[0, 0, 0, 1]);
-        file.ints(&[1])
-            .reals(&[0.0; 6])
-            .sizes(&[1])
-            .ints(&[9])
-            .sizes(&[0])
-            .text("\n$EndEntities\n$Nodes\n");
-        file.sizes(&[1, 4, 7, 40])
-            .ints(&[3, 1, 0])
-            .sizes(&[4, 10, 20, 7, 40])
-            .reals(&CORNERS)
-            .text("\n$EndNodes\n$Elements\n");
-        file.sizes(&[1, 1, 5, 5])
-            .ints(&[3, 1, 4])
-            .sizes(&[1, 5, 10, 20, 7, 40])
-            .text("\n$EndElements\n");
-        let content = assert_tetrahedron("t.msh", &file.bytes);
+        let content = assert_tetrahedron("t.msh", &gmsh_4_binary(big));
         assert_eq!(content.cell_data, [field("reference", 1, vec![9.0])]);
     }
     for (code, name) in [(11, "second-order tetrahedron"), (9, "second-order triangle")] {
@@ -383,6 +393,33 @@ fn gmsh_in_both_versions_encodings_and_byte_orders() {
         let error = format::read("t.msh", text.as_bytes()).expect_err("higher order");
         assert!(error.message.contains(name) && error.line == Some(10), "{error}");
     }
+}
+
+fn vtk_5_binary() -> Vec<u8> {
+    let mut file = Bytes::new(true);
+    file.text("# vtk DataFile Version 5.1\nt\nBINARY\nDATASET UNSTRUCTURED_GRID\nPOINTS 4 double\n")
+        .reals(&CORNERS);
+    file.text("\nMETADATA\nINFORMATION 0\n\nCELLS 2 4\nOFFSETS vtktypeint64\n")
+        .sizes(&[0, 4]);
+    file.text("\nCONNECTIVITY vtktypeint64\n")
+        .sizes(&[0, 1, 2, 3])
+        .text("\nCELL_TYPES 1\n")
+        .ints(&[10]);
+    file.text("\nCELL_DATA 1\nSCALARS q int\nLOOKUP_TABLE own\n")
+        .ints(&[-5])
+        .text("\nLOOKUP_TABLE own 1\n")
+        .text("abcd\n");
+    file.bytes
+}
+
+fn vtk_3_binary() -> Vec<u8> {
+    let mut file = Bytes::new(true);
+    file.text("# vtk DataFile Version 3.0\nt\nBINARY\nDATASET POLYDATA\nPOINTS 4 double\n")
+        .reals(&CORNERS);
+    file.text("\nPOLYGONS 2 9\n")
+        .ints(&[3, 0, 1, 2, 4, 0, 1, 2, 3])
+        .text("\n");
+    file.bytes
 }
 
 #[test]
@@ -397,29 +434,10 @@ fn legacy_vtk_in_both_layouts_and_encodings() {
     assert_eq!(content.cell_data, [field("q", 2, vec![3.0, 4.0])]);
     assert_eq!(content.notices.len(), 2, "{:?}", content.notices);
 
-    let mut file = Bytes::new(true);
-    file.text("# vtk DataFile Version 5.1\nt\nBINARY\nDATASET UNSTRUCTURED_GRID\nPOINTS 4 double\n")
-        .reals(&CORNERS);
-    file.text("\nMETADATA\nINFORMATION 0\n\nCELLS 2 4\nOFFSETS vtktypeint64\n")
-        .sizes(&[0, 4]);
-    file.text("\nCONNECTIVITY vtktypeint64\n")
-        .sizes(&[0, 1, 2, 3])
-        .text("\nCELL_TYPES 1\n")
-        .ints(&[10]);
-    file.text("\nCELL_DATA 1\nSCALARS q int\nLOOKUP_TABLE own\n")
-        .ints(&[-5])
-        .text("\nLOOKUP_TABLE own 1\n")
-        .text("abcd\n");
-    let content = assert_tetrahedron("t.vtk", &file.bytes);
+    let content = assert_tetrahedron("t.vtk", &vtk_5_binary());
     assert_eq!(content.cell_data, [field("q", 1, vec![-5.0])]);
 
-    let mut file = Bytes::new(true);
-    file.text("# vtk DataFile Version 3.0\nt\nBINARY\nDATASET POLYDATA\nPOINTS 4 double\n")
-        .reals(&CORNERS);
-    file.text("\nPOLYGONS 2 9\n")
-        .ints(&[3, 0, 1, 2, 4, 0, 1, 2, 3])
-        .text("\n");
-    let content = format::read("t.vtk", &file.bytes).unwrap_or_else(|error| panic!("{error}"));
+    let content = format::read("t.vtk", &vtk_3_binary()).unwrap_or_else(|error| panic!("{error}"));
     assert_eq!((content.triangles.len(), content.quads.len()), (1, 1));
 
     let voxel = "# vtk DataFile Version 2.0\n\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 8 float\n0 0 0 1 0 0 0 1 0 1 1 0 0 0 1 1 0 1 0 1 1 1 1 1\n\
@@ -432,6 +450,60 @@ fn legacy_vtk_in_both_layouts_and_encodings() {
         error.message.contains("quadratic tetrahedron") && error.line == Some(10),
         "{error}"
     );
+}
+
+/// A file of every format and encoding, all of them sound.
+pub fn specimens() -> Vec<(String, Vec<u8>)> {
+    let mut all = Vec::new();
+    for entry in FORMATS {
+        let mut content = sample(entry.cells);
+        if entry.format == Format::Stl {
+            content.points.truncate(0);
+            content.points.resize(9, [0.5, -1.0, 2.0]);
+        }
+        let written = format::write(entry.format, &content).expect("the format holds these cells");
+        all.push((format!("written.{}", extension(entry.format)), written.bytes));
+    }
+    for big in [false, true] {
+        all.push(("binary.msh".to_string(), gmsh_2_binary(big)));
+        all.push(("binary.msh".to_string(), gmsh_4_binary(big)));
+        all.push(("binary.ply".to_string(), ply_binary(big)));
+    }
+    all.push(("binary.vtk".to_string(), vtk_5_binary()));
+    all.push(("polygons.vtk".to_string(), vtk_3_binary()));
+    all.push((
+        "text.ply".to_string(),
+        (ply_header("ascii") + "0 0 0 0 0\n1 1 0 1 77 0\n2 0 1.5 2 77 78 0\n3 0 0 0 1\n9\n4 0 1 2 3 2.5\n")
+            .into_bytes(),
+    ));
+    let facet = "facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\n";
+    all.push((
+        "text.stl".to_string(),
+        format!("solid s\n{facet}{facet}endsolid s\n").into_bytes(),
+    ));
+    let ascii = |kind: &str, name: &str, components: usize, _: &[u8], text: &str| {
+        format!(
+            "<DataArray type='{kind}' Name='{name}' NumberOfComponents='{components}' format='ascii'>{text}</DataArray>"
+        )
+    };
+    all.push(("text.vtu".to_string(), vtu_by_hand("", false, ascii, b"")));
+    let mut appended = Vec::new();
+    let raw = |kind: &str, name: &str, components: usize, bytes: &[u8], _: &str| {
+        let offset = appended.len();
+        appended.extend_from_slice(&(bytes.len() as u32).to_le_bytes());
+        appended.extend_from_slice(bytes);
+        format!(
+            "<DataArray type='{kind}' Name='{name}' NumberOfComponents='{components}' format='appended' offset='{offset}'/>"
+        )
+    };
+    let mut file = vtu_by_hand("", false, raw, b"<AppendedData encoding='raw'>_");
+    file.truncate(file.len() - b"</VTKFile>\n".len());
+    file.extend_from_slice(&appended);
+    all.push(("appended.vtu".to_string(), file));
+    for (name, bytes) in &all {
+        format::read(name, bytes).unwrap_or_else(|error| panic!("{error}"));
+    }
+    all
 }
 
 /// A VTU file whose arrays are written by `array(type, name, components, bytes, text)`.
@@ -649,15 +721,33 @@ fn stl_welds_equal_vertices_and_no_others() {
     assert_eq!(again.triangles, content.triangles[..2]);
 }
 
-#[test]
-fn ply_in_three_encodings_with_other_properties() {
-    let header = |form: &str| {
-        format!(
-            "ply\nformat {form} 1.0\ncomment by hand\nelement vertex 4\nproperty uchar red\nproperty double x\nproperty double y\n\
+fn ply_header(form: &str) -> String {
+    format!(
+        "ply\nformat {form} 1.0\ncomment by hand\nelement vertex 4\nproperty uchar red\nproperty double x\nproperty double y\n\
              property list uchar int extra\nproperty double z\nelement material 1\nproperty int m\nelement face 1\n\
              property list int int vertex_indices\nproperty double area\nend_header\n"
-        )
-    };
+    )
+}
+
+fn ply_binary(big: bool) -> Vec<u8> {
+    let mut file = Bytes::new(big);
+    file.text(&ply_header(if big {
+        "binary_big_endian"
+    } else {
+        "binary_little_endian"
+    }));
+    for (row, point) in CORNERS.chunks(3).enumerate() {
+        file.bytes.push(row as u8);
+        file.reals(&point[..2]);
+        file.bytes.push(1);
+        file.ints(&[77]).reals(&point[2..]);
+    }
+    file.ints(&[9]).ints(&[4, 0, 1, 2, 3]).reals(&[2.5]);
+    file.bytes
+}
+
+#[test]
+fn ply_in_three_encodings_with_other_properties() {
     let check = |file: &[u8]| {
         let content = format::read("t.ply", file).unwrap_or_else(|error| panic!("{error}"));
         assert_eq!(content.points.as_flattened(), CORNERS);
@@ -666,22 +756,11 @@ fn ply_in_three_encodings_with_other_properties() {
         assert_eq!(content.cell_data, [field("area", 1, vec![2.5])]);
         assert_eq!(content.notices.len(), 2, "{:?}", content.notices);
     };
-    check((header("ascii") + "0 0 0 0 0\n1 1 0 1 77 0\n2 0 1.5 2 77 78 0\n3 0 0 0 1\n9\n4 0 1 2 3 2.5\n").as_bytes());
+    check(
+        (ply_header("ascii") + "0 0 0 0 0\n1 1 0 1 77 0\n2 0 1.5 2 77 78 0\n3 0 0 0 1\n9\n4 0 1 2 3 2.5\n").as_bytes(),
+    );
     for big in [false, true] {
-        let mut file = Bytes::new(big);
-        file.text(&header(if big {
-            "binary_big_endian"
-        } else {
-            "binary_little_endian"
-        }));
-        for (row, point) in CORNERS.chunks(3).enumerate() {
-            file.bytes.push(row as u8);
-            file.reals(&point[..2]);
-            file.bytes.push(1);
-            file.ints(&[77]).reals(&point[2..]);
-        }
-        file.ints(&[9]).ints(&[4, 0, 1, 2, 3]).reals(&[2.5]);
-        check(&file.bytes);
+        check(&ply_binary(big));
     }
 }
 

@@ -24,7 +24,7 @@ fn numbers_round_to_significant_digits() {
     .iter()
     .map(|&value| number::round(value, 4).plain())
     .collect();
-    insta::assert_snapshot!(plain.join(" "), @"");
+    insta::assert_snapshot!("rounded", plain.join(" "));
     assert_eq!(
         number::round(-1.234e-7, 3).unicode(),
         "\u{2212}1.23\u{d7}10\u{207b}\u{2077}"
@@ -38,10 +38,10 @@ fn numbers_round_to_significant_digits() {
 fn a_table_in_every_form() {
     let experiment = sample::experiment();
     let grid = build(&experiment, &experiment.tables[0], &sample::rows());
-    insta::assert_snapshot!(markdown::write(&grid), @"");
-    insta::assert_snapshot!(String::from_utf8(csv::write(&grid).unwrap()).unwrap(), @"");
-    insta::assert_snapshot!(latex::write(&grid), @"");
-    insta::assert_snapshot!(terminal::write(&grid, None), @"");
+    insta::assert_snapshot!("markdown", markdown::write(&grid));
+    insta::assert_snapshot!("csv", String::from_utf8(csv::write(&grid).unwrap()).unwrap());
+    insta::assert_snapshot!("latex", latex::write(&grid));
+    insta::assert_snapshot!("terminal", terminal::write(&grid, None));
 }
 
 #[test]
@@ -56,19 +56,19 @@ fn several_jobs_in_a_row_give_mean_and_deviation() {
         published: None,
     };
     let grid = build(&sample::experiment(), &table, &rows);
-    insta::assert_snapshot!(markdown::write(&grid), @"");
+    insta::assert_snapshot!("deviation", markdown::write(&grid));
 }
 
 #[test]
 fn jobs_csv_has_a_row_a_job_unrounded() {
     let text = String::from_utf8(jobs::write(&sample::experiment(), &sample::rows()).unwrap()).unwrap();
-    insta::assert_snapshot!(text, @"");
+    insta::assert_snapshot!("jobs", text);
 }
 
 #[test]
 fn macros_define_every_figure() {
     let text = macros::write(&sample::experiment(), &sample::rows()[..1], &[]);
-    insta::assert_snapshot!(text, @"");
+    insta::assert_snapshot!("macros", text);
 }
 
 fn plot(x: &str, y: &str, log: bool) -> Plot {
@@ -169,7 +169,7 @@ fn two_result_sets_side_by_side() {
     let sheet = |rows: &[_]| compare::Sheet::read(&jobs::write(&experiment, rows).unwrap()).unwrap();
     let comparison = compare::compare(&sheet(&left), &sheet(&right));
     assert!(!comparison.same() && comparison.results().count() == 2);
-    insta::assert_snapshot!(compare::describe(&comparison, "before", "after"), @"");
+    insta::assert_snapshot!("comparison", compare::describe(&comparison, "before", "after"));
     assert!(compare::compare(&sheet(&left), &sheet(&left)).same());
     assert!(compare::Sheet::read(b"a,b\n1,2\n").is_err());
 }

@@ -3,7 +3,7 @@
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use vargeo::experiment::file::{
-    Axis, Bound, Comparison, Condition, Expectation, Experiment, Limits, Plot, Published, Rate, Table, Timing,
+    Axis, Bound, Comparison, Condition, Expectation, Experiment, Limits, Origin, Plot, Published, Rate, Table, Timing,
 };
 use vargeo::experiment::job::{Job, JobPart, Key};
 use vargeo::experiment::record::{JobResult, Measurement, Phase, Record, Status};
@@ -307,6 +307,7 @@ pub fn experiment() -> Experiment {
             }],
             line: 12,
         }],
+        origin: Origin::default(),
     }
 }
 

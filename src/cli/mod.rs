@@ -3,6 +3,8 @@
 mod check;
 mod explain;
 mod input;
+mod check;
+mod compare;
 mod job;
 mod list;
 mod mesh;
@@ -52,6 +54,9 @@ enum Command {
     Report(report::Arguments),
     Plan(plan::Arguments),
     New(new::Arguments),
+    Check(check::Arguments),
+    Report(report::Arguments),
+    Compare(compare::Arguments),
     List(list::Arguments),
     Schema(schema::Arguments),
     Explain(explain::Arguments),
@@ -83,6 +88,9 @@ pub fn main() -> ExitCode {
         Command::New(arguments) => new::execute(arguments),
         Command::Schema(arguments) => schema::execute(arguments),
         Command::Explain(arguments) => explain::execute(arguments),
+        Command::Check(arguments) => check::execute(arguments),
+        Command::Report(arguments) => report::execute(arguments),
+        Command::Compare(arguments) => compare::execute(arguments),
         Command::List(arguments) => list::execute(arguments),
         Command::Mesh(arguments) => mesh::execute(arguments),
         Command::Store(arguments) => store::execute(arguments),

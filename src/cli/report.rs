@@ -1,15 +1,15 @@
-//! `vargeo report`: tables, plots, pictures and the page from what is stored, running nothing.
+//! `vargeo report`: the report of an experiment from its stored records, without running anything.
 
 use super::Exit;
 use super::input::Input;
-use super::run::{rows, write_report, wrong};
-use crate::experiment::plan::{Plan, PlannedJob};
+use super::run;
+use crate::experiment::record::Record;
 use crate::run::Finished;
 use crate::run::pool::{effort, skipped};
 use crate::run::store::{Lookup, Store};
 use std::path::PathBuf;
 
-/// Writes the report of an experiment from stored results, running nothing.
+/// Writes tables, plots, pictures and the page of an experiment from stored records, and runs nothing.
 #[derive(clap::Args)]
 pub struct Arguments {
     #[command(flatten)]
@@ -22,48 +22,54 @@ pub struct Arguments {
     quiet: bool,
 }
 
-/// Looks up, then reports.
+/// Reports what is stored; jobs that never ran are named and left out.
 pub fn execute(arguments: Arguments) -> Exit {
-    report(&arguments).unwrap_or_else(|exit| exit)
-}
-
-fn report(arguments: &Arguments) -> Result<Exit, Exit> {
-    let plan = arguments.input.plan()?;
-    let store = Store::new(arguments.results.join("store"));
-    let found = look_up(&plan, &store);
-    let missing = plan.jobs.len() - found.len();
-    if missing > 0 {
-        eprintln!(
-            "notice: {missing} of {} jobs are not stored and not in the report; `vargeo run {}` computes them",
-            plan.jobs.len(),
-            arguments.input.file.display()
-        );
-    }
-    if !found.iter().any(|finished| finished.cached) {
-        wrong("nothing is stored of this experiment");
-        return Ok(Exit::NothingRan);
-    }
-    let rows = rows(&plan, &store, found);
-    write_report(&plan.experiment, &rows, &arguments.results, arguments.quiet)?;
-    Ok(Exit::Well)
-}
-
-/// Results with whatever times were taken, recorded failures, and jobs without their optional model.
-fn look_up(plan: &Plan, store: &Store) -> Vec<Finished> {
-    let effort = effort(plan, None);
-    let find = |(index, job): (usize, &PlannedJob)| -> Option<Finished> {
-        let finished = |record, cached| Finished { index, record, cached };
-        let Some((key, _)) = &job.resolved else {
-            return Some(finished(skipped(&plan.experiment, job, effort), false));
-        };
-        match store.lookup(key) {
-            Lookup::Hit(record) => return Some(finished(*record, true)),
-            Lookup::Damaged { reason, .. } => {
-                eprintln!("warning: the stored result of {} is damaged ({reason})", job.name);
-            }
-            Lookup::Miss => {}
-        }
-        store.failure(key).map(|record| finished(record, true))
+    let plan = match arguments.input.plan() {
+        Ok(plan) => plan,
+        Err(exit) => return exit,
     };
-    plan.jobs.iter().enumerate().filter_map(find).collect()
+    let store = Store::new(arguments.results.join("store"));
+    let effort = effort(&plan, None);
+    let mut finished = Vec::new();
+    let mut absent = Vec::new();
+    for (index, job) in plan.jobs.iter().enumerate() {
+        let record: Option<Record> = match &job.resolved {
+            None => Some(skipped(&plan, job, effort)),
+            Some((key, _)) => match store.lookup(key) {
+                Lookup::Hit(record) => Some(*record),
+                Lookup::Miss => store.failure(key),
+                Lookup::Damaged { reason, .. } => {
+                    eprintln!(
+                        "warning: the stored result of {} is damaged and left out: {reason}",
+                        job.name
+                    );
+                    None
+                }
+            },
+        };
+        match record {
+            Some(record) => finished.push(Finished {
+                index,
+                record,
+                cached: true,
+            }),
+            None => absent.push(job.name.as_str()),
+        }
+    }
+    let file = plan.experiment.name.as_str();
+    if finished.iter().all(|finished| finished.record.key.0.is_empty()) {
+        eprintln!(
+            "error: no job of {file} is stored in {}\nhelp: `vargeo run` computes them",
+            store.root().display()
+        );
+        return Exit::NothingRan;
+    }
+    if !absent.is_empty() {
+        eprintln!("warning: not stored and left out of the report: {}", absent.join(", "));
+    }
+    let rows = run::rows(&plan, &store, finished);
+    match run::write_report(&plan.experiment, &rows, &arguments.results, arguments.quiet) {
+        Ok(_) => Exit::Well,
+        Err(exit) => exit,
+    }
 }

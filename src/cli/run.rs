@@ -7,7 +7,7 @@ use crate::experiment::grid;
 use crate::experiment::nearest::suggestion;
 use crate::experiment::plan::Plan;
 use crate::experiment::record::{Record, Status};
-use crate::report::gate::{Outcome, Verdict};
+use crate::report::gate::Outcome;
 use crate::report::{self, Row};
 use crate::run::interrupt::Interrupt;
 use crate::run::store::{MESH, Store};
@@ -31,7 +31,7 @@ pub struct Arguments {
 pub(super) struct Running {
     /// Folder of results.
     #[arg(long, value_name = "DIR", default_value = "results")]
-    pub(super) results: PathBuf,
+    results: PathBuf,
     /// Jobs side by side; as many as the cores permit by default, and one where times are taken exclusively.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=4096))]
     jobs: Option<u32>,
@@ -46,7 +46,7 @@ pub(super) struct Running {
     force: bool,
     /// Show warnings and errors only.
     #[arg(long, short)]
-    pub(super) quiet: bool,
+    quiet: bool,
 }
 
 /// Runs, then reports.
@@ -142,14 +142,13 @@ fn choose(plan: &Plan, only: &[String]) -> Result<Option<Vec<usize>>, Exit> {
     Ok(Some(chosen))
 }
 
-/// Prints an error.
-pub(super) fn wrong(message: &str) -> Exit {
+fn wrong(message: &str) -> Exit {
     eprintln!("error: {message}");
     Exit::FileWrong
 }
 
 /// Prints a line; a reader who has gone away is no reason to stop computing.
-pub(super) fn say(text: &str) {
+fn say(text: &str) {
     let _ = writeln!(std::io::stdout(), "{text}");
 }
 
@@ -249,39 +248,18 @@ pub(super) fn write_report(
     let written = report::write(experiment, rows, &folder).map_err(|error| wrong(&error.to_string()))?;
     if !quiet {
         say(&report::terminal(experiment, rows, None));
-        tell_verdicts(&written.verdicts);
+        let unmet = written
+            .verdicts
+            .iter()
+            .filter(|verdict| verdict.outcome == Outcome::Failed)
+            .count();
+        if unmet > 0 {
+            say(&format!(
+                "{unmet} of {} expectations are not met; `vargeo check` says which",
+                written.verdicts.len()
+            ));
+        }
         say(&format!("page: {}", written.page.display()));
     }
     Ok(written)
-}
-
-/// Says which expectations were not met, and how many were.
-fn tell_verdicts(verdicts: &[Verdict]) {
-    let judged = verdicts
-        .iter()
-        .filter(|verdict| verdict.outcome != Outcome::Skipped)
-        .count();
-    let unmet = verdicts.iter().filter(|verdict| verdict.outcome == Outcome::Failed);
-    let mut count = 0;
-    for Verdict {
-        place,
-        subject,
-        expected,
-        found,
-        ..
-    } in unmet
-    {
-        let subject = if subject.is_empty() {
-            String::new()
-        } else {
-            format!(" {subject}:")
-        };
-        say(&format!(
-            "not met ({place}):{subject} expected {expected}, found {found}"
-        ));
-        count += 1;
-    }
-    if judged > 0 {
-        say(&format!("{} of {judged} expectations are met", judged - count));
-    }
 }

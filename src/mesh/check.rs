@@ -279,9 +279,9 @@ fn shape_and_orientation(mesh: &mut TetrahedralMesh, problems: &mut Problems) {
             mesh.cells[first]
         )
     });
-    let facets = connectivity::facets(&mesh.cells, vertices);
-    let crowded = (facets.crowded > 0).then_some(facets.first_crowded as usize);
-    if let Some(first) = crowded {
+    let mut facets = connectivity::facets(&mesh.cells, vertices);
+    if facets.crowded > 0 {
+        let first = facets.first_crowded as usize;
         problems.0.push(Problem {
             kind: "non-manifold-face",
             severity: Severity::Error,
@@ -295,12 +295,13 @@ fn shape_and_orientation(mesh: &mut TetrahedralMesh, problems: &mut Problems) {
         });
     }
     let negative: Vec<usize> = (0..total).filter(|&cell| determinants[cell] < 0.0).collect();
-    let turn = |mesh: &mut TetrahedralMesh| {
+    let turn = |mesh: &mut TetrahedralMesh, facets: &mut Facets<4>| {
         for &cell in &negative {
             mesh.cells[cell].swap(2, 3);
+            facets.neighbours[cell].swap(2, 3);
         }
     };
-    turn(mesh);
+    turn(mesh, &mut facets);
     let folded = folded(&mesh.cells, &facets);
     if folded.is_empty() {
         let reversed = negative.iter().copied();
@@ -324,7 +325,7 @@ fn shape_and_orientation(mesh: &mut TetrahedralMesh, problems: &mut Problems) {
         // The order of the vertices was sound and the positions are not: leave the cells as they are.
         let before = negative.len();
         let (count, first) = (folded.len(), folded[0]);
-        turn(mesh);
+        turn(mesh, &mut facets);
         // A mesh that is reversed as a whole shows its few positive tetrahedra as the inverted ones.
         let inverted = before.min(total - before);
         let reversed = before > total - before;
@@ -366,16 +367,14 @@ fn shape_and_orientation(mesh: &mut TetrahedralMesh, problems: &mut Problems) {
             |_, _| format!("the mesh has {parts} separate parts; a target shape needs a single one"),
         );
     }
-    if crowded.is_none() {
-        let pinched = connectivity::pinched_vertices(&mesh.cells, vertices, &facets);
-        let pinched = pinched.iter().map(|&vertex| vertex as usize);
-        problems.add("pinched-vertex", Severity::Warning, Element::Vertex, pinched, |count, first| {
-            format!(
-                "{} parts of the mesh that share no face there, the first is vertex {first}; the boundary is no manifold",
-                counted(count, "vertex joins", "vertices join")
-            )
-        });
-    }
+    let pinched = connectivity::pinched_vertices(&mesh.cells, vertices, &facets);
+    let pinched = pinched.iter().map(|&vertex| vertex as usize);
+    problems.add("pinched-vertex", Severity::Warning, Element::Vertex, pinched, |count, first| {
+        format!(
+            "{} parts of the mesh that share no face there, the first is vertex {first}; the boundary is no manifold",
+            counted(count, "vertex joins", "vertices join")
+        )
+    });
     let poor = (0..total).filter(|&cell| {
         let shape = scaled_jacobian(mesh.corners(mesh.cells[cell]));
         shape > 0.0 && shape < 1e-3

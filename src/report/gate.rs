@@ -77,7 +77,7 @@ fn judge_expectation(experiment: &Experiment, expectation: &Expectation, rows: &
                 place: place.clone(),
                 subject: row.name.clone(),
                 expected,
-                found,
+                found: if skipped { ended(row) } else { found },
                 outcome: if skipped { Outcome::Skipped } else { outcome(met) },
             });
         };
@@ -199,7 +199,10 @@ pub fn holds(bound: &Bound, value: f64) -> bool {
 
 /// A bound in words.
 pub fn describe(bound: &Bound) -> String {
-    let plain = |value: f64| number::round(value, 6).plain();
+    let plain = |value: f64| {
+        let wide = value != 0.0 && !(1e-4..1e9).contains(&value.abs());
+        if wide { format!("{value:e}") } else { format!("{value}") }
+    };
     let mut parts = Vec::new();
     if let Some(min) = bound.min {
         parts.push(format!("at least {}", plain(min)));

@@ -8,10 +8,9 @@ use super::job::{damage, memory_reason};
 use super::protocol::{Effort, Message, Request};
 use super::provenance;
 use super::store::{Lookup, Store, StoreError};
-use crate::experiment::file::Experiment;
 use crate::experiment::job::{Job, Key};
 use crate::experiment::plan::{Plan, PlannedJob};
-use crate::experiment::record::{JobResult, RECORD_SCHEMA, Record, Status};
+use crate::experiment::record::{JobResult, Record, Status};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, VecDeque};
 use std::ffi::OsString;
@@ -123,6 +122,27 @@ pub fn stored(store: &Store, job: &PlannedJob, effort: Effort) -> Lookup {
     }
 }
 
+/// The record of a job whose optional model is missing. It has no key: nothing was resolved.
+pub fn skipped(plan: &Plan, job: &PlannedJob, effort: Effort) -> Record {
+    let experiment = &plan.experiment;
+    let reason = job.missing.clone().unwrap_or_else(|| "its model is missing".into());
+    Record {
+        key: Key(String::new()),
+        job: Job {
+            record_schema: crate::experiment::record::RECORD_SCHEMA,
+            method: experiment.method.name().into(),
+            method_version: experiment.method.version(),
+            model: BTreeMap::new(),
+            settings: serde_json::Value::Object(serde_json::Map::new()),
+        },
+        result: JobResult {
+            status: Status::Skipped,
+            ..failure("missing-model", reason)
+        },
+        measurement: unmeasured(effort, &job.inputs),
+    }
+}
+
 /// Runs every job of a plan that the store does not hold, and returns a record for each.
 ///
 /// Errors only when the store cannot be written at all. Call it from a thread that lives as long as the run: the job
@@ -148,26 +168,6 @@ pub fn run_plan(plan: &Plan, options: &Options, listener: &mut dyn Listener) -> 
     let mut run = pool.run;
     run.finished.sort_by_key(|finished| finished.index);
     Ok(run)
-}
-
-/// The record of a job whose optional model is missing. It has no key: nothing was resolved.
-pub fn skipped(experiment: &Experiment, job: &PlannedJob, effort: Effort) -> Record {
-    let reason = job.missing.clone().unwrap_or_else(|| "its model is missing".into());
-    Record {
-        key: Key(String::new()),
-        job: Job {
-            record_schema: RECORD_SCHEMA,
-            method: experiment.method.name().into(),
-            method_version: experiment.method.version(),
-            model: BTreeMap::new(),
-            settings: serde_json::Value::Object(serde_json::Map::new()),
-        },
-        result: JobResult {
-            status: Status::Skipped,
-            ..failure("missing-model", reason)
-        },
-        measurement: unmeasured(effort, &job.inputs),
-    }
 }
 
 struct Pool<'a> {
@@ -228,7 +228,7 @@ impl Pool<'_> {
         let mut finished = Vec::new();
         for (index, (job, found)) in jobs.iter().zip(found).enumerate() {
             let Some((key, resolved)) = &job.resolved else {
-                finished.push((index, skipped(&self.plan.experiment, job, effort), false));
+                finished.push((index, skipped(self.plan, job, self.effort), false));
                 continue;
             };
             match found {

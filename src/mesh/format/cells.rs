@@ -265,7 +265,7 @@ impl Sorter {
             content.cell_data.push(field);
         }
         for (name, count) in self.left_out {
-            content.notices.push(format!("{count} {name} left out"));
+            content.notices.push(format!("{name} left out: {count}"));
         }
         if self.split > 0 {
             content.notices.push(format!(

@@ -213,7 +213,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Content, Fault> {
     }
     let mut content = sorter.finish(points, Vec::new(), Vec::new())?;
     for (keyword, count) in lines.left_out {
-        content.notices.push(format!("{count} lines of {keyword:?} left out"));
+        content.notices.push(format!("lines of {keyword:?} left out: {count}"));
     }
     Ok(content)
 }

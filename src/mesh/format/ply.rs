@@ -83,7 +83,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Content, Fault> {
             }
             _ => {
                 if element.count > 0 {
-                    notices.push(format!("{} elements {:?} left out", element.count, element.name));
+                    notices.push(format!("elements {:?} left out: {}", element.name, element.count));
                 }
                 if !element.properties.is_empty() {
                     for _ in 0..element.count {

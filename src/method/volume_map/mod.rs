@@ -31,12 +31,13 @@ use super::setting::Field;
 use super::{Failure, Inputs, Method, Outcome};
 use crate::energy::lim_barrier::LimBarrier;
 use crate::energy::mapping::{Density, MappingEnergy};
+use crate::energy::target_weighted::TargetWeighted;
 use crate::metric::Metric;
 use crate::optimize::{NewtonObjective, Observer, StopReason};
 use objective::MapObjective;
 use problem::Problem;
 use serde_json::Value;
-use settings::{Hessian, OnInfeasible, Settings, Solver};
+use settings::{Hessian, OnInfeasible, Settings, Solver, Weighting};
 use std::collections::BTreeMap;
 use trace::Trace;
 
@@ -249,7 +250,10 @@ pub fn run(problem: &Problem, settings: &Settings, observer: &mut dyn Observer) 
 
 /// The density that is minimized, with its barrier.
 fn density(problem: &Problem, settings: &Settings) -> Result<Density, Failure> {
-    let density = Density::new(settings.density()?);
+    let density = match settings.weighting {
+        Weighting::Target => Density::of(TargetWeighted(settings.density()?)),
+        Weighting::Volume | Weighting::Uniform => Density::new(settings.density()?),
+    };
     if !settings.with_barrier() {
         return Ok(density);
     }

@@ -198,10 +198,15 @@ impl Problem {
         volumes.into_iter().map(|volume| volume / total).collect()
     }
 
-    /// The weights of a setting. Those by target volume are given by the density and start from the source's volumes.
+    /// The weights of a setting, a factor for each tetrahedron. By target volume the density brings `det J` along, and
+    /// the weights divide by its mean.
     pub fn weights(&self, weighting: Weighting) -> Vec<f64> {
         match weighting {
-            Weighting::Volume | Weighting::Target => self.volume_weights(),
+            Weighting::Volume => self.volume_weights(),
+            Weighting::Target => {
+                let mean = self.mean_determinant();
+                self.volume_weights().into_iter().map(|weight| weight / mean).collect()
+            }
             Weighting::Uniform => vec![1.0 / self.source.cells.len() as f64; self.source.cells.len()],
         }
     }

@@ -1,6 +1,5 @@
 //! The command line: one command a file, each with its arguments and its `execute`.
 
-mod check;
 mod explain;
 mod input;
 mod check;
@@ -50,8 +49,6 @@ const EXIT_CODES: &str = "Exit codes: 0 all well, 1 an expectation was not met, 
 #[derive(Subcommand)]
 enum Command {
     Run(run::Arguments),
-    Check(check::Arguments),
-    Report(report::Arguments),
     Plan(plan::Arguments),
     New(new::Arguments),
     Check(check::Arguments),
@@ -82,8 +79,6 @@ pub fn main() -> ExitCode {
     };
     let exit = match arguments.command {
         Command::Run(arguments) => run::execute(arguments),
-        Command::Check(arguments) => check::execute(arguments),
-        Command::Report(arguments) => report::execute(arguments),
         Command::Plan(arguments) => plan::execute(arguments),
         Command::New(arguments) => new::execute(arguments),
         Command::Schema(arguments) => schema::execute(arguments),

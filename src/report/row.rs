@@ -107,7 +107,7 @@ pub fn label(value: &Value) -> String {
         Value::Null => "none".into(),
         Value::Bool(flag) => if *flag { "yes" } else { "no" }.into(),
         Value::Number(number) => match number.as_f64() {
-            Some(value) if number.is_f64() => super::number::round(value, 6).plain(),
+            Some(value) if number.is_f64() => super::number::written(value),
             _ => number.to_string(),
         },
         Value::String(text) => text.clone(),

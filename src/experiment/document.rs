@@ -149,3 +149,20 @@ fn convert_list(items: &DeArray<'_>, source: &Arc<Source>, diagnostics: &mut Vec
         .map(|item| convert(item.get_ref(), item.span(), source, diagnostics))
         .collect()
 }
+
+/// Text as a basic string of TOML.
+pub fn quote(text: &str) -> String {
+    let mut quoted = String::from("\"");
+    for character in text.chars() {
+        match character {
+            '"' | '\\' => {
+                quoted.push('\\');
+                quoted.push(character);
+            }
+            control if control.is_control() => quoted.push_str(&format!("\\u{:04X}", control as u32)),
+            other => quoted.push(other),
+        }
+    }
+    quoted.push('"');
+    quoted
+}

@@ -14,5 +14,7 @@ pub mod nearest;
 pub mod plan;
 pub mod read;
 pub mod record;
+pub mod schema;
 pub mod section;
+pub mod template;
 pub mod unit;

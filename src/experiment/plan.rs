@@ -7,14 +7,14 @@ use super::check::{defaults, fields_of};
 use super::diagnostic::Diagnostic;
 use super::file::{Experiment, Model, PartSpecification};
 use super::grid::{self, Point, show};
-use super::job::{Job, JobPart, Key};
+use super::job::{Job, JobPart, Key, sha256};
 use super::read::axes::parameter;
 use super::record::RECORD_SCHEMA;
+use crate::mesh::format::Format;
 use crate::method::setting::Field;
 use serde_json::{Map, Value};
-use sha2::{Digest, Sha256};
 use std::collections::{BTreeMap, BTreeSet};
-use std::io::{self, Read};
+use std::io;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -202,7 +202,7 @@ fn resolve_model(
     experiment: &Experiment,
     model: &Model,
     lookup: &Lookup,
-    hashed: &mut BTreeMap<PathBuf, String>,
+    identified: &mut BTreeMap<PathBuf, (String, String)>,
     diagnostics: &mut Vec<Diagnostic>,
 ) -> Option<Result<Resolved, String>> {
     let mut resolved = Resolved {
@@ -243,12 +243,12 @@ fn resolve_model(
                 continue;
             }
         };
-        let sha256 = match hashed.get(&found) {
+        let (sha256, format) = match identified.get(&found) {
             Some(known) => known.clone(),
-            None => match hash(&found) {
-                Ok(sha256) => {
-                    hashed.insert(found.clone(), sha256.clone());
-                    sha256
+            None => match identify(&found) {
+                Ok(identity) => {
+                    identified.insert(found.clone(), identity.clone());
+                    identity
                 }
                 Err(error) => {
                     let message = format!("cannot read {}: {error}", found.display());
@@ -259,7 +259,7 @@ fn resolve_model(
         };
         let part = JobPart::File {
             sha256,
-            format: format(&found),
+            format,
             parameters: parameters.clone(),
         };
         resolved.parts.insert(role.clone(), part);
@@ -279,23 +279,16 @@ fn resolve_model(
     }
 }
 
-/// The extension in lower case, which tells the reader.
-fn format(path: &Path) -> String {
-    path.extension()
-        .map_or_else(String::new, |extension| extension.to_string_lossy().to_lowercase())
-}
-
-fn hash(path: &Path) -> io::Result<String> {
-    let mut file = std::fs::File::open(path)?;
-    let mut hasher = Sha256::new();
-    let mut buffer = vec![0; 1 << 16];
-    loop {
-        let count = file.read(&mut buffer)?;
-        if count == 0 {
-            return Ok(hasher.finalize().iter().map(|byte| format!("{byte:02x}")).collect());
-        }
-        hasher.update(&buffer[..count]);
-    }
+/// SHA-256 and format of a file. A format that the content shows does not depend on the file's name.
+fn identify(path: &Path) -> io::Result<(String, String)> {
+    let bytes = std::fs::read(path)?;
+    let format = match Format::of_content(&bytes) {
+        Some(format) => format.entry().name.to_owned(),
+        None => path
+            .extension()
+            .map_or_else(String::new, |extension| extension.to_string_lossy().to_lowercase()),
+    };
+    Ok((sha256(&bytes), format))
 }
 
 /// Where an entry stands, or the nearest table around it.

@@ -139,6 +139,13 @@ pub const STOPS: &[(&str, &str)] = &[
     ("crashed", "the job's process ended by a signal"),
     ("panicked", "the job ran into a defect of the program"),
     ("missing-model", "an optional model's file is absent"),
+    ("not-started", "the job's process could not be started"),
+    (
+        "not-stored",
+        "the result was computed but could not be written to the store",
+    ),
+    ("input-changed", "an input file changed after the run was planned"),
+    ("input-unreadable", "an input file could not be read"),
 ];
 
 mod word {

@@ -270,18 +270,18 @@ fn shape_and_orientation(mesh: &mut TetrahedralMesh, problems: &mut Problems) {
     let (vertices, total) = (mesh.points.len(), mesh.cells.len());
     let determinants: Vec<f64> = mesh.cells.iter().map(|&cell| determinant(mesh.corners(cell))).collect();
     let flat = |cell: usize| determinants[cell].abs() / 6.0 <= FLAT * longest(mesh.corners(mesh.cells[cell])).powi(3);
-    let flat: Vec<usize> = (0..total).filter(|&cell| flat(cell)).collect();
-    let degenerate = !flat.is_empty();
-    problems.add("degenerate-cell", Severity::Error, Element::Cell, flat.into_iter(), |count, first| {
+    let is_flat: Vec<bool> = (0..total).map(flat).collect();
+    let flat = (0..total).filter(|&cell| is_flat[cell]);
+    problems.add("degenerate-cell", Severity::Error, Element::Cell, flat, |count, first| {
         format!(
             "{count} of {total} tetrahedra have no volume, the first is tetrahedron {first} with vertices {:?}; remove \
              or remesh them",
             mesh.cells[first]
         )
     });
-    let facets = connectivity::facets(&mesh.cells, vertices);
-    let crowded = (facets.crowded > 0).then_some(facets.first_crowded as usize);
-    if let Some(first) = crowded {
+    let mut facets = connectivity::facets(&mesh.cells, vertices);
+    if facets.crowded > 0 {
+        let first = facets.first_crowded as usize;
         problems.0.push(Problem {
             kind: "non-manifold-face",
             severity: Severity::Error,
@@ -294,13 +294,24 @@ fn shape_and_orientation(mesh: &mut TetrahedralMesh, problems: &mut Problems) {
             ),
         });
     }
-    let negative: Vec<usize> = (0..total).filter(|&cell| determinants[cell] < 0.0).collect();
-    let turn = |mesh: &mut TetrahedralMesh| {
-        for &cell in &negative {
-            mesh.cells[cell].swap(2, 3);
+    let signs = (0..total).filter(|&cell| !is_flat[cell]);
+    let mostly_reversed = 2 * signs.clone().filter(|&cell| determinants[cell] < 0.0).count() > signs.count();
+    // The sign of a flat tetrahedron is noise; it goes with the majority.
+    let is_negative = |cell: usize| {
+        if is_flat[cell] {
+            mostly_reversed
+        } else {
+            determinants[cell] < 0.0
         }
     };
-    turn(mesh);
+    let negative: Vec<usize> = (0..total).filter(|&cell| is_negative(cell)).collect();
+    let turn = |mesh: &mut TetrahedralMesh, facets: &mut Facets<4>| {
+        for &cell in &negative {
+            mesh.cells[cell].swap(2, 3);
+            facets.neighbours[cell].swap(2, 3);
+        }
+    };
+    turn(mesh, &mut facets);
     let folded = folded(&mesh.cells, &facets);
     if folded.is_empty() {
         let reversed = negative.iter().copied();
@@ -320,17 +331,16 @@ fn shape_and_orientation(mesh: &mut TetrahedralMesh, problems: &mut Problems) {
                 }
             },
         );
-    } else if !degenerate {
+    } else {
         // The order of the vertices was sound and the positions are not: leave the cells as they are.
-        let before = negative.len();
         let (count, first) = (folded.len(), folded[0]);
-        turn(mesh);
+        turn(mesh, &mut facets);
         // A mesh that is reversed as a whole shows its few positive tetrahedra as the inverted ones.
-        let inverted = before.min(total - before);
-        let reversed = before > total - before;
-        let first = (0..total)
-            .find(|&cell| (determinants[cell] < 0.0) != reversed)
-            .unwrap_or(first);
+        let mut odd = (0..total)
+            .filter(|&cell| is_negative(cell) != mostly_reversed)
+            .peekable();
+        let first = odd.peek().copied().unwrap_or(first);
+        let inverted = odd.count();
         let (kind, message) = if inverted == 0 {
             (
                 "overlap",
@@ -366,16 +376,14 @@ fn shape_and_orientation(mesh: &mut TetrahedralMesh, problems: &mut Problems) {
             |_, _| format!("the mesh has {parts} separate parts; a target shape needs a single one"),
         );
     }
-    if crowded.is_none() {
-        let pinched = connectivity::pinched_vertices(&mesh.cells, vertices, &facets);
-        let pinched = pinched.iter().map(|&vertex| vertex as usize);
-        problems.add("pinched-vertex", Severity::Warning, Element::Vertex, pinched, |count, first| {
-            format!(
-                "{} parts of the mesh that share no face there, the first is vertex {first}; the boundary is no manifold",
-                counted(count, "vertex joins", "vertices join")
-            )
-        });
-    }
+    let pinched = connectivity::pinched_vertices(&mesh.cells, vertices, &facets);
+    let pinched = pinched.iter().map(|&vertex| vertex as usize);
+    problems.add("pinched-vertex", Severity::Warning, Element::Vertex, pinched, |count, first| {
+        format!(
+            "{} parts of the mesh that share no face there, the first is vertex {first}; the boundary is no manifold",
+            counted(count, "vertex joins", "vertices join")
+        )
+    });
     let poor = (0..total).filter(|&cell| {
         let shape = scaled_jacobian(mesh.corners(mesh.cells[cell]));
         shape > 0.0 && shape < 1e-3
@@ -393,27 +401,6 @@ fn shape_and_orientation(mesh: &mut TetrahedralMesh, problems: &mut Problems) {
             )
         },
     );
-}
-
-/// Checks a tetrahedral mesh for use in a computation: returns it with its reversed tetrahedra turned round, and notices
-/// for the reader.
-///
-/// # Errors
-/// All errors of [`tetrahedra`], one a line.
-pub fn usable(mut mesh: TetrahedralMesh) -> Result<(TetrahedralMesh, Vec<String>), String> {
-    let problems = tetrahedra(&mut mesh);
-    let of = |error: bool| {
-        problems
-            .iter()
-            .filter(move |problem| (problem.severity == Severity::Error) == error)
-            .map(|p| p.message.clone())
-    };
-    let errors: Vec<String> = of(true).collect();
-    if errors.is_empty() {
-        Ok((mesh, of(false).collect()))
-    } else {
-        Err(errors.join("\n"))
-    }
 }
 
 /// Checks a triangle surface. Open boundaries and separate parts are no problems; they are in the summary. Errors come

@@ -195,6 +195,17 @@ pub struct Boundary {
     pub vertices: Vec<u32>,
 }
 
+impl Boundary {
+    /// The index within [`Boundary::vertices`] of every vertex of the mesh; [`NONE`] for interior ones.
+    pub fn places(&self) -> Vec<u32> {
+        let mut places = vec![NONE; self.mask.len()];
+        for (place, &vertex) in (0..).zip(&self.vertices) {
+            places[vertex as usize] = place;
+        }
+        places
+    }
+}
+
 /// The boundary of tetrahedra: the faces with one tetrahedron.
 pub fn boundary(cells: &[[u32; 4]], vertices: usize) -> Boundary {
     boundary_from(cells, vertices, &facets(cells, vertices))
@@ -288,7 +299,7 @@ pub fn components<const N: usize>(cells: &[[u32; N]], vertices: usize) -> Compon
 }
 
 /// Vertices whose cells do not hang together through facets at the vertex: two parts touch there in a point (or, for
-/// tetrahedra, along an edge). Ascending.
+/// tetrahedra, along an edge). Ascending. Vertices of facets with three or more cells are passed over.
 pub fn pinched_vertices<const N: usize>(cells: &[[u32; N]], vertices: usize, facets: &Facets<N>) -> Vec<u32> {
     let mut corners = DisjointSets::new(cells.len() * N);
     for (index, (cell, neighbours)) in cells.iter().zip(&facets.neighbours).enumerate() {
@@ -308,16 +319,19 @@ pub fn pinched_vertices<const N: usize>(cells: &[[u32; N]], vertices: usize, fac
         }
     }
     let mut fans = vec![0u8; vertices];
+    let mut crowded = vec![false; vertices];
     for (index, cell) in cells.iter().enumerate() {
         for (corner, &vertex) in cell.iter().enumerate() {
             let item = (index * N + corner) as u32;
             if corners.root(item) == item {
                 fans[vertex as usize] = fans[vertex as usize].saturating_add(1);
             }
+            let other = |local: usize| local != corner && facets.neighbours[index][local] == CROWDED;
+            crowded[vertex as usize] |= (0..N).any(other);
         }
     }
     (0..vertices as u32)
-        .filter(|&vertex| fans[vertex as usize] > 1)
+        .filter(|&vertex| fans[vertex as usize] > 1 && !crowded[vertex as usize])
         .collect()
 }
 

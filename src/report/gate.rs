@@ -77,7 +77,7 @@ fn judge_expectation(experiment: &Experiment, expectation: &Expectation, rows: &
                 place: place.clone(),
                 subject: row.name.clone(),
                 expected,
-                found,
+                found: if skipped { ended(row) } else { found },
                 outcome: if skipped { Outcome::Skipped } else { outcome(met) },
             });
         };
@@ -199,7 +199,7 @@ pub fn holds(bound: &Bound, value: f64) -> bool {
 
 /// A bound in words.
 pub fn describe(bound: &Bound) -> String {
-    let plain = |value: f64| number::round(value, 6).plain();
+    let plain = number::written;
     let mut parts = Vec::new();
     if let Some(min) = bound.min {
         parts.push(format!("at least {}", plain(min)));
@@ -209,7 +209,11 @@ pub fn describe(bound: &Bound) -> String {
     }
     if let Some(equals) = bound.equals {
         parts.push(match bound.tolerance {
-            Some(tolerance) => format!("{} within {} %", plain(equals), plain(100.0 * tolerance)),
+            Some(tolerance) => format!(
+                "{} within {} %",
+                plain(equals),
+                number::round(100.0 * tolerance, 3).plain()
+            ),
             None => format!("exactly {}", plain(equals)),
         });
     }

@@ -2,9 +2,9 @@
 
 use super::ReportError;
 use super::number::iso_moment;
-use super::row::{MEASURED, Row};
+use super::row::Row;
 use crate::experiment::file::Experiment;
-use crate::experiment::record::Status;
+use crate::experiment::record::{MEASUREMENTS, Status};
 use serde_json::Value;
 use std::collections::BTreeSet;
 
@@ -37,13 +37,24 @@ pub fn write(experiment: &Experiment, rows: &[Row]) -> Result<Vec<u8>, ReportErr
         }
     };
     let mut head: Vec<String> = vec!["job".into()];
-    head.extend(axes.iter().map(|axis| axis.to_string()));
+    // An axis may be named like a figure, such as `energy`: no two columns share a name.
+    let is_figure = |axis: &str| {
+        declared.iter().any(|metric| metric.name == axis) || others.contains(axis) || counters.contains(axis)
+    };
+    head.extend(axes.iter().map(|axis| {
+        if is_figure(axis) {
+            format!("{axis} (axis)")
+        } else {
+            axis.to_string()
+        }
+    }));
     head.extend(["status", "stop", "reason"].map(String::from));
     head.extend(declared.iter().map(|metric| unit(metric.name, metric.unit)));
     head.extend(others.iter().chain(&counters).map(|name| name.to_string()));
-    head.extend(MEASURED.iter().map(|measured| unit(measured.name, measured.unit)));
+    head.extend(MEASUREMENTS.iter().map(|measured| unit(measured.name, measured.unit)));
     head.extend(
         [
+            "threads",
             "repetitions",
             "exclusive",
             "timed",
@@ -84,11 +95,12 @@ pub fn write(experiment: &Experiment, rows: &[Row]) -> Result<Vec<u8>, ReportErr
                 .map_or_else(String::new, |count| count.to_string())
         }));
         fields.extend(
-            MEASURED
+            MEASUREMENTS
                 .iter()
-                .map(|measured| measured.of(row).map_or_else(String::new, exact)),
+                .map(|measured| row.measurement(measured.name).map_or_else(String::new, exact)),
         );
         fields.extend([
+            measurement.threads.to_string(),
             measurement.wall_seconds.len().to_string(),
             if measurement.exclusive { "yes" } else { "no" }.into(),
             iso_moment(measurement.started),

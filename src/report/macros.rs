@@ -1,8 +1,9 @@
 //! `macros.tex`: every rounded figure by name, so that prose cannot drift from the tables.
 
 use super::number;
-use super::row::{MEASURED, Quantity, Row};
+use super::row::{Quantity, Row};
 use crate::experiment::file::Experiment;
+use crate::experiment::record::MEASUREMENTS;
 use std::fmt::Write;
 
 /// Defines `\vargeo{JOB}{FIGURE}`; a figure that does not exist is an error of the document, never an empty place.
@@ -23,7 +24,7 @@ pub fn write(experiment: &Experiment, rows: &[Row], rates: &[super::rate::Fit]) 
     for row in rows {
         let result = &row.record.result;
         let names = result.metrics.keys().chain(result.counters.keys()).map(String::as_str);
-        for figure in names.chain(MEASURED.iter().map(|measured| measured.name)) {
+        for figure in names.chain(MEASUREMENTS.iter().map(|measured| measured.name)) {
             if let Some(value) = row.figure(figure) {
                 let digits = Quantity::find(experiment, figure).digits;
                 define(&row.name, figure, &number::round(value, digits).latex());

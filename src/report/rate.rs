@@ -61,6 +61,11 @@ pub fn fit(points: &[(f64, f64)]) -> Option<Line> {
     })
 }
 
+/// A rate to two decimals.
+pub fn shown(rate: f64) -> String {
+    format!("{rate:.2}")
+}
+
 /// Every rate of the experiment, a fit for each series in the order of the jobs.
 pub fn fits(experiment: &Experiment, rows: &[Row]) -> Vec<Fit> {
     experiment
@@ -88,7 +93,7 @@ fn fit_series(rate: &Rate, rows: &[Row]) -> Vec<Fit> {
         };
         let (_, points, left_out) = &mut series[index];
         let usable = |value: Option<f64>| value.filter(|value| value.is_finite() && *value > 0.0);
-        match (usable(row.figure(&rate.x)), usable(row.figure(&rate.y))) {
+        match (usable(row.coordinate(&rate.x)), usable(row.figure(&rate.y))) {
             (Some(x), Some(y)) => {
                 if rate.window.is_none_or(|[low, high]| (low..=high).contains(&x)) {
                     let seed = |axis: &str| axis.rsplit('.').next() == Some("seed");
@@ -182,7 +187,7 @@ impl Fit {
         let mut text = format!("{} against {}{series}: ", self.y, self.x);
         match self.line {
             Some(line) => {
-                text.push_str(&format!("slope {}", round(line.slope, 3).plain()));
+                text.push_str(&format!("slope {}", shown(line.slope)));
                 if let Some(error) = line.standard_error {
                     text.push_str(&format!(" \u{b1} {}", round(error, 2).plain()));
                 }
@@ -191,14 +196,10 @@ impl Fit {
             None => text.push_str(&format!("no slope from {} points", self.points.len())),
         }
         if let Some(last) = self.last_pair {
-            text.push_str(&format!("; last pair {}", round(last, 3).plain()));
+            text.push_str(&format!("; last pair {}", shown(last)));
         }
         if let Some((low, high, count)) = self.spread {
-            text.push_str(&format!(
-                "; {} to {} over {count} seeds",
-                round(low, 3).plain(),
-                round(high, 3).plain()
-            ));
+            text.push_str(&format!("; {} to {} over {count} seeds", shown(low), shown(high)));
         }
         if let Some([low, high]) = self.window {
             text.push_str(&format!(

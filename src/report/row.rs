@@ -1,9 +1,12 @@
 //! A job as the report sees it, what it can be asked for by name, and conditions on its axes.
 
+use crate::experiment::column;
 use crate::experiment::file::{Condition, Experiment};
-use crate::experiment::record::{Record, Status};
+use crate::experiment::record::{MEASUREMENTS, Record, Status};
 use crate::metric::Better;
 use serde_json::Value;
+
+const MEBIBYTE: f64 = 1_048_576.0;
 
 /// One job of the plan with its record.
 #[derive(Clone, Debug)]
@@ -32,18 +35,42 @@ impl Row {
         Some(value)
     }
 
-    /// A figure by name: a metric, a measurement, a counter or a numeric axis, in this order.
+    /// A figure by name: a metric, a counter, a measurement or a numeric axis, in this order. Bytes are returned in MiB,
+    /// as [`Quantity`] says.
     pub fn figure(&self, name: &str) -> Option<f64> {
-        if let Some(&value) = self.record.result.metrics.get(name) {
+        let result = &self.record.result;
+        if let Some(&value) = result.metrics.get(name) {
             return Some(value);
         }
-        if let Some(measured) = MEASURED.iter().find(|measured| measured.name == name) {
-            return (measured.value)(self);
-        }
-        if let Some(&count) = self.record.result.counters.get(name) {
+        if let Some(&count) = result.counters.get(name) {
             return Some(count as f64);
         }
-        self.axis(name)?.as_f64()
+        match MEASUREMENTS.iter().find(|measured| measured.name == name) {
+            Some(measured) => {
+                let value = self.measurement(name)?;
+                Some(if measured.unit == "B" { value / MEBIBYTE } else { value })
+            }
+            None => self.axis(name)?.as_f64(),
+        }
+    }
+
+    /// The place on a plot's or rate's x: a varied axis comes before a figure of its name, such as `energy`.
+    pub fn coordinate(&self, name: &str) -> Option<f64> {
+        match self.axes.iter().find(|(axis, _)| axis == name) {
+            Some((_, value)) => value.as_f64(),
+            None => self.figure(name),
+        }
+    }
+
+    /// A measurement in its own unit; absent where nothing was measured.
+    pub fn measurement(&self, name: &str) -> Option<f64> {
+        let measurement = &self.record.measurement;
+        match name {
+            "seconds" => median(&measurement.wall_seconds),
+            "cpu_seconds" => median(&measurement.cpu_seconds),
+            "peak_memory" => Some(measurement.peak_memory as f64).filter(|bytes| *bytes > 0.0),
+            _ => None,
+        }
     }
 
     /// Whether the method returned an outcome.
@@ -88,7 +115,7 @@ pub fn label(value: &Value) -> String {
         Value::Null => "none".into(),
         Value::Bool(flag) => if *flag { "yes" } else { "no" }.into(),
         Value::Number(number) => match number.as_f64() {
-            Some(value) if number.is_f64() => super::number::round(value, 6).plain(),
+            Some(value) if number.is_f64() => super::number::written(value),
             _ => number.to_string(),
         },
         Value::String(text) => text.clone(),
@@ -102,59 +129,6 @@ pub fn label(value: &Value) -> String {
             })
             .collect::<Vec<_>>()
             .join(" "),
-    }
-}
-
-/// A measurement that every method's record holds.
-pub struct Measured {
-    pub name: &'static str,
-    pub unit: &'static str,
-    pub definition: &'static str,
-    value: fn(&Row) -> Option<f64>,
-}
-
-/// Measurements that tables, plots, rates and expectations may name beside a method's metrics.
-pub const MEASURED: &[Measured] = &[
-    Measured {
-        name: "seconds",
-        unit: "s",
-        definition: "wall-clock time of the method itself, median of the repetitions",
-        value: |row| median(&row.record.measurement.wall_seconds),
-    },
-    Measured {
-        name: "cpu_seconds",
-        unit: "s",
-        definition: "processor time of the method over all threads, median of the repetitions",
-        value: |row| median(&row.record.measurement.cpu_seconds),
-    },
-    Measured {
-        name: "peak_memory",
-        unit: "MiB",
-        definition: "peak resident memory of the job's process",
-        value: |row| match row.record.measurement.peak_memory {
-            0 => None,
-            bytes => Some(bytes as f64 / (1024.0 * 1024.0)),
-        },
-    },
-    Measured {
-        name: "threads",
-        unit: "",
-        definition: "threads that the job was given",
-        value: |row| match row.record.measurement.threads {
-            0 => None,
-            threads => Some(threads as f64),
-        },
-    },
-];
-
-/// The middle value, or the mean of the middle two.
-pub fn median(values: &[f64]) -> Option<f64> {
-    let mut sorted: Vec<f64> = values.iter().copied().filter(|value| !value.is_nan()).collect();
-    sorted.sort_by(f64::total_cmp);
-    match sorted.len() {
-        0 => None,
-        count if count % 2 == 1 => Some(sorted[count / 2]),
-        count => Some(0.5 * (sorted[count / 2 - 1] + sorted[count / 2])),
     }
 }
 
@@ -173,43 +147,33 @@ pub struct Quantity {
 }
 
 impl Quantity {
-    /// The quantity of this name in an experiment. Unknown names are counters, axes or trace columns: pure numbers.
+    /// The quantity of this name in an experiment. Other names are axes or trace columns: pure numbers.
     pub fn find(experiment: &Experiment, name: &str) -> Quantity {
-        if let Some(metric) = experiment.method.metrics().iter().find(|metric| metric.name == name) {
-            return Quantity {
+        let measured = MEASUREMENTS.iter().any(|measured| measured.name == name);
+        match column::find(experiment.method, name) {
+            Some(column) => Quantity {
                 name: name.into(),
-                symbol: metric.symbol.into(),
-                unit: metric.unit.into(),
-                better: metric.better,
-                definition: metric.definition.into(),
-                digits: 4,
-                measured: false,
-            };
-        }
-        if let Some(measured) = MEASURED.iter().find(|measured| measured.name == name) {
-            let better = if name == "threads" {
-                Better::Neither
-            } else {
-                Better::Lower
-            };
-            return Quantity {
+                symbol: column.symbol.into(),
+                unit: if measured && column.unit == "B" {
+                    "MiB"
+                } else {
+                    column.unit
+                }
+                .into(),
+                better: column.better,
+                definition: column.definition.into(),
+                digits: if measured { 3 } else { 4 },
+                measured,
+            },
+            None => Quantity {
                 name: name.into(),
                 symbol: name.replace('_', " "),
-                unit: measured.unit.into(),
-                better,
-                definition: measured.definition.into(),
-                digits: 3,
-                measured: true,
-            };
-        }
-        Quantity {
-            name: name.into(),
-            symbol: name.replace('_', " "),
-            unit: String::new(),
-            better: Better::Neither,
-            definition: String::new(),
-            digits: 4,
-            measured: false,
+                unit: String::new(),
+                better: Better::Neither,
+                definition: String::new(),
+                digits: 4,
+                measured: false,
+            },
         }
     }
 
@@ -223,9 +187,14 @@ impl Quantity {
     }
 }
 
-impl Measured {
-    /// The job's value; absent where nothing was measured.
-    pub fn of(&self, row: &Row) -> Option<f64> {
-        (self.value)(row)
+/// The middle value, or the mean of the two middle ones; none of an empty list.
+pub fn median(values: &[f64]) -> Option<f64> {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let middle = sorted.len() / 2;
+    match sorted.len() {
+        0 => None,
+        odd if odd % 2 == 1 => Some(sorted[middle]),
+        _ => Some(0.5 * (sorted[middle - 1] + sorted[middle])),
     }
 }

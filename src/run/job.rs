@@ -58,9 +58,7 @@ fn confine(request: &Request, interrupt: &Interrupt) {
         };
         let _ = rustix::process::setrlimit(rustix::process::Resource::As, limit);
     }
-    let asked = interrupt.clone();
-    let _ = ctrlc::set_handler(move || {
-        asked.set();
+    interrupt.listen(|_| {
         // A method that does not look at its observer is not waited for: nothing unfinished is ever visible.
         std::thread::sleep(Duration::from_millis(900));
         std::process::exit(130);

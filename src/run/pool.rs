@@ -62,6 +62,8 @@ pub struct Options {
     pub threads: Option<usize>,
     /// Compute everything again and compare with what is stored.
     pub force: bool,
+    /// Compute only these jobs of the plan; the others are returned as far as they are stored.
+    pub only: Option<Vec<usize>>,
     pub interrupt: Interrupt,
 }
 
@@ -77,7 +79,8 @@ pub struct Finished {
 /// What a run leaves.
 #[derive(Debug, Default)]
 pub struct Run {
-    /// In the order of the plan. After an interruption, jobs that did not finish are absent.
+    /// In the order of the plan. Jobs that were not asked for and are not stored are absent, and so are, after an
+    /// interruption, those that did not finish.
     pub finished: Vec<Finished>,
     pub interrupted: bool,
     /// Damage, results that are not deterministic, records that could not be written.
@@ -116,6 +119,27 @@ pub fn stored(store: &Store, job: &PlannedJob, effort: Effort) -> Lookup {
             Lookup::Hit(record) if !effort.is_met_by(&record) => Lookup::Miss,
             other => other,
         },
+    }
+}
+
+/// The record of a job whose optional model is missing. It has no key: nothing was resolved.
+pub fn skipped(plan: &Plan, job: &PlannedJob, effort: Effort) -> Record {
+    let experiment = &plan.experiment;
+    let reason = job.missing.clone().unwrap_or_else(|| "its model is missing".into());
+    Record {
+        key: Key(String::new()),
+        job: Job {
+            record_schema: crate::experiment::record::RECORD_SCHEMA,
+            method: experiment.method.name().into(),
+            method_version: experiment.method.version(),
+            model: BTreeMap::new(),
+            settings: serde_json::Value::Object(serde_json::Map::new()),
+        },
+        result: JobResult {
+            status: Status::Skipped,
+            ..failure("missing-model", reason)
+        },
+        measurement: unmeasured(effort, &job.inputs),
     }
 }
 
@@ -188,11 +212,15 @@ impl Pool<'_> {
     /// Fills the queue with what the store does not hold.
     fn look_up(&mut self) {
         let jobs = &self.plan.jobs;
+        let options = self.options;
+        let wanted = |index: usize| options.only.as_ref().is_none_or(|only| only.contains(&index));
+        let effort = self.effort;
         let found: Vec<Lookup> = jobs
             .par_iter()
-            .map(|job| match self.options.force {
+            .enumerate()
+            .map(|(index, job)| match options.force && wanted(index) {
                 true => Lookup::Miss,
-                false => stored(&self.options.store, job, self.effort),
+                false => stored(&options.store, job, effort),
             })
             .collect();
         let mut tasks: BTreeMap<Key, usize> = BTreeMap::new();
@@ -200,7 +228,7 @@ impl Pool<'_> {
         let mut finished = Vec::new();
         for (index, (job, found)) in jobs.iter().zip(found).enumerate() {
             let Some((key, resolved)) = &job.resolved else {
-                finished.push((index, self.skipped(job), false));
+                finished.push((index, skipped(self.plan, job, self.effort), false));
                 continue;
             };
             match found {
@@ -210,6 +238,9 @@ impl Pool<'_> {
                 }
                 Lookup::Damaged { reason, quarantine } => warnings.push(damage(&key.0, &reason, &quarantine)),
                 Lookup::Miss => {}
+            }
+            if !wanted(index) {
+                continue;
             }
             match tasks.get(key) {
                 Some(&place) => self.queue[place].indices.push(index),
@@ -231,34 +262,13 @@ impl Pool<'_> {
             jobs: jobs.len(),
             stored,
             skipped: finished.len() - stored,
-            missing: jobs.len() - finished.len(),
+            missing: self.queue.iter().map(|task| task.indices.len()).sum(),
             side_by_side: self.side_by_side(),
             threads: self.effort.threads,
         });
         warnings.into_iter().for_each(|text| self.warn(text));
         for (index, record, cached) in finished {
             self.finish(index, record, cached);
-        }
-    }
-
-    /// The record of a job whose optional model is missing. It has no key: nothing was resolved.
-    fn skipped(&self, job: &PlannedJob) -> Record {
-        let experiment = &self.plan.experiment;
-        let reason = job.missing.clone().unwrap_or_else(|| "its model is missing".into());
-        Record {
-            key: Key(String::new()),
-            job: Job {
-                record_schema: crate::experiment::record::RECORD_SCHEMA,
-                method: experiment.method.name().into(),
-                method_version: experiment.method.version(),
-                model: BTreeMap::new(),
-                settings: serde_json::Value::Object(serde_json::Map::new()),
-            },
-            result: JobResult {
-                status: Status::Skipped,
-                ..failure("missing-model", reason)
-            },
-            measurement: unmeasured(self.effort, &job.inputs),
         }
     }
 

@@ -5,7 +5,7 @@
 
 pub mod axes;
 mod expect;
-mod models;
+pub mod models;
 mod outputs;
 mod published;
 

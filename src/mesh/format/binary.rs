@@ -1,6 +1,4 @@
-//! Numbers in binary files.
-
-use super::Fault;
+//! Numbers in binary form.
 
 /// A type of numbers in a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -36,65 +34,55 @@ pub(super) enum Order {
     Big,
 }
 
-fn converted<const N: usize, T>(bytes: &[u8], order: Order, from: impl Fn([u8; N]) -> T) -> Vec<T> {
-    let (chunks, _) = bytes.as_chunks::<N>();
-    match order {
-        Order::Little => chunks.iter().map(|&chunk| from(chunk)).collect(),
-        Order::Big => chunks
-            .iter()
-            .map(|&(mut chunk)| {
-                chunk.reverse();
-                from(chunk)
-            })
-            .collect(),
+/// The first `N` of `bytes`, the least significant first; zeros where there are fewer.
+fn chunk<const N: usize>(bytes: &[u8], order: Order) -> [u8; N] {
+    let mut chunk = bytes.first_chunk().copied().unwrap_or([0; N]);
+    if order == Order::Big {
+        chunk.reverse();
     }
+    chunk
 }
 
-/// The numbers in `bytes`; bytes beyond the last whole number are ignored.
-pub(super) fn reals(scalar: Scalar, order: Order, bytes: &[u8]) -> Vec<f64> {
+/// The number that `bytes` start with.
+pub(super) fn real(scalar: Scalar, order: Order, bytes: &[u8]) -> f64 {
     match scalar {
-        Scalar::Int8 => converted(bytes, order, |b| f64::from(i8::from_le_bytes(b))),
-        Scalar::UInt8 => converted(bytes, order, |b| f64::from(u8::from_le_bytes(b))),
-        Scalar::Int16 => converted(bytes, order, |b| f64::from(i16::from_le_bytes(b))),
-        Scalar::UInt16 => converted(bytes, order, |b| f64::from(u16::from_le_bytes(b))),
-        Scalar::Int32 => converted(bytes, order, |b| f64::from(i32::from_le_bytes(b))),
-        Scalar::UInt32 => converted(bytes, order, |b| f64::from(u32::from_le_bytes(b))),
-        Scalar::Int64 => converted(bytes, order, |b| i64::from_le_bytes(b) as f64),
-        Scalar::UInt64 => converted(bytes, order, |b| u64::from_le_bytes(b) as f64),
-        Scalar::Float32 => converted(bytes, order, |b| f64::from(f32::from_le_bytes(b))),
-        Scalar::Float64 => converted(bytes, order, f64::from_le_bytes),
+        Scalar::Int8 => f64::from(i8::from_le_bytes(chunk(bytes, order))),
+        Scalar::UInt8 => f64::from(u8::from_le_bytes(chunk(bytes, order))),
+        Scalar::Int16 => f64::from(i16::from_le_bytes(chunk(bytes, order))),
+        Scalar::UInt16 => f64::from(u16::from_le_bytes(chunk(bytes, order))),
+        Scalar::Int32 => f64::from(i32::from_le_bytes(chunk(bytes, order))),
+        Scalar::UInt32 => f64::from(u32::from_le_bytes(chunk(bytes, order))),
+        Scalar::Int64 => i64::from_le_bytes(chunk(bytes, order)) as f64,
+        Scalar::UInt64 => u64::from_le_bytes(chunk(bytes, order)) as f64,
+        Scalar::Float32 => f64::from(f32::from_le_bytes(chunk(bytes, order))),
+        Scalar::Float64 => f64::from_le_bytes(chunk(bytes, order)),
     }
 }
 
-/// The integers in `bytes`; `None` for the types of real numbers. Unsigned numbers beyond `i64` become -1, no valid index.
-pub(super) fn integers(scalar: Scalar, order: Order, bytes: &[u8]) -> Option<Vec<i64>> {
+/// The integer that `bytes` start with; `None` for the types of real numbers. An unsigned number beyond `i64` becomes -1,
+/// which is no valid index or count.
+pub(super) fn integer(scalar: Scalar, order: Order, bytes: &[u8]) -> Option<i64> {
     Some(match scalar {
-        Scalar::Int8 => converted(bytes, order, |b| i64::from(i8::from_le_bytes(b))),
-        Scalar::UInt8 => converted(bytes, order, |b| i64::from(u8::from_le_bytes(b))),
-        Scalar::Int16 => converted(bytes, order, |b| i64::from(i16::from_le_bytes(b))),
-        Scalar::UInt16 => converted(bytes, order, |b| i64::from(u16::from_le_bytes(b))),
-        Scalar::Int32 => converted(bytes, order, |b| i64::from(i32::from_le_bytes(b))),
-        Scalar::UInt32 => converted(bytes, order, |b| i64::from(u32::from_le_bytes(b))),
-        Scalar::Int64 => converted(bytes, order, i64::from_le_bytes),
-        Scalar::UInt64 => converted(bytes, order, |b| i64::try_from(u64::from_le_bytes(b)).unwrap_or(-1)),
+        Scalar::Int8 => i64::from(i8::from_le_bytes(chunk(bytes, order))),
+        Scalar::UInt8 => i64::from(u8::from_le_bytes(chunk(bytes, order))),
+        Scalar::Int16 => i64::from(i16::from_le_bytes(chunk(bytes, order))),
+        Scalar::UInt16 => i64::from(u16::from_le_bytes(chunk(bytes, order))),
+        Scalar::Int32 => i64::from(i32::from_le_bytes(chunk(bytes, order))),
+        Scalar::UInt32 => i64::from(u32::from_le_bytes(chunk(bytes, order))),
+        Scalar::Int64 => i64::from_le_bytes(chunk(bytes, order)),
+        Scalar::UInt64 => i64::try_from(u64::from_le_bytes(chunk(bytes, order))).unwrap_or(-1),
         Scalar::Float32 | Scalar::Float64 => return None,
     })
 }
 
-/// The next `count` numbers of `size` bytes at `at`, and the offset behind them.
-pub(super) fn take<'a>(
-    bytes: &'a [u8],
-    at: usize,
-    count: usize,
-    size: usize,
-    what: std::fmt::Arguments<'_>,
-) -> Result<(&'a [u8], usize), Fault> {
-    let left = bytes.len().saturating_sub(at);
-    match count.checked_mul(size) {
-        Some(wanted) if wanted <= left => Ok((&bytes[at..at + wanted], at + wanted)),
-        _ => Err(Fault::binary(
-            at,
-            format!("{what} needs {count} x {size} bytes, {left} are left; the file is cut off, or a count is damaged"),
-        )),
-    }
+/// The numbers in `bytes`; bytes beyond the last whole number are ignored.
+pub(super) fn reals(scalar: Scalar, order: Order, bytes: &[u8]) -> Vec<f64> {
+    let chunks = bytes.chunks_exact(scalar.size());
+    chunks.map(|bytes| real(scalar, order, bytes)).collect()
+}
+
+/// The integers in `bytes`, as [`integer`] reads each.
+pub(super) fn integers(scalar: Scalar, order: Order, bytes: &[u8]) -> Option<Vec<i64>> {
+    let chunks = bytes.chunks_exact(scalar.size());
+    chunks.map(|bytes| integer(scalar, order, bytes)).collect()
 }

@@ -128,6 +128,9 @@ impl<'a> Cells<'a> {
     }
 }
 
+/// The most by which splitting polygons may multiply the data of cells.
+const MOST_REPEATED: usize = 64;
+
 /// Sorts cells by kind as a file lists them, and their data with them.
 #[derive(Default)]
 pub(super) struct Sorter {
@@ -229,6 +232,17 @@ impl Sorter {
             }
         }
         content.point_data = point_data;
+        // A fan repeats the row of its polygon; a hostile file could ask for far more than it holds.
+        let given: usize = cell_data.iter().map(|field| field.values.len()).sum();
+        let wanted: usize = cell_data
+            .iter()
+            .map(|field| field.components.saturating_mul(content.cells().count()))
+            .sum();
+        if wanted > MOST_REPEATED * (given + content.cells().count() + 1024) {
+            return Err(Fault::whole(
+                "the data of polygons would be repeated too often when they are split; split them in the program that wrote the file",
+            ));
+        }
         for mut field in cell_data {
             if field.values.len() != self.row as usize * field.components {
                 return Err(Fault::whole(format!(
@@ -251,7 +265,7 @@ impl Sorter {
             content.cell_data.push(field);
         }
         for (name, count) in self.left_out {
-            content.notices.push(format!("{count} {name} left out"));
+            content.notices.push(format!("{name} left out: {count}"));
         }
         if self.split > 0 {
             content.notices.push(format!(

@@ -168,7 +168,7 @@ fn check_indices(bytes: &[u8], section: &Section, vertices: usize) -> Result<(),
 }
 
 /// Writes version 2 (double precision) in three dimensions; the field `reference` becomes the references.
-pub(super) fn write(content: &Content) -> Written {
+pub(super) fn write(content: &Content) -> Result<Written, String> {
     let mut out = Vec::with_capacity(64 * content.points.len() + 32 * content.cells().count() + 256);
     let point_labels = reference_labels(&content.point_data);
     let cell_labels = reference_labels(&content.cell_data);
@@ -206,8 +206,8 @@ pub(super) fn write(content: &Content) -> Written {
         };
         field.name == super::REFERENCE && reference_labels(fields).is_some()
     };
-    Written {
+    Ok(Written {
         bytes: out,
         notices: left_out("MEDIT", content, keeps),
-    }
+    })
 }

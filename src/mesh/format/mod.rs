@@ -9,10 +9,16 @@
 
 mod binary;
 mod cells;
+mod numbers;
 mod text;
 
-pub mod medit;
-pub mod vtk;
+mod gmsh;
+mod medit;
+mod obj;
+mod off;
+mod ply;
+mod stl;
+mod vtk;
 pub mod vtu;
 
 pub use cells::{CellKind, Cells};
@@ -34,7 +40,8 @@ pub struct Field {
 ///
 /// Corners are numbered as in VTK and Gmsh: a tetrahedron (0,1,2,3) is positive when `det[x1-x0, x2-x0, x3-x0] > 0`; a
 /// hexahedron lists its bottom quad, then the top one; a prism its bottom triangle, then the top one; a pyramid its base,
-/// then the apex.
+/// then the apex. Some VTK files, by an older reading of its guide, have the prism's triangles the other way round; they are
+/// kept as they are.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Content {
     /// In the units of the file.
@@ -78,7 +85,15 @@ pub struct Written {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
     Medit,
+    Gmsh,
+    /// Version 2.2, for programs that do not know 4.1.
+    Gmsh2,
+    Vtk,
     Vtu,
+    Obj,
+    Off,
+    Stl,
+    Ply,
 }
 
 /// What the program knows about a format.
@@ -93,7 +108,7 @@ pub struct Entry {
     pub doc: &'static str,
     sniff: fn(&[u8]) -> bool,
     read: fn(&[u8]) -> Result<Content, Fault>,
-    write: fn(&Content) -> Written,
+    write: fn(&Content) -> Result<Written, String>,
 }
 
 /// All formats; the first that recognises the content of a file reads it.
@@ -109,6 +124,36 @@ pub const FORMATS: &[Entry] = &[
         write: medit::write,
     },
     Entry {
+        format: Format::Gmsh,
+        name: "Gmsh 4.1",
+        extensions: &["msh", "msh4"],
+        cells: &CellKind::ALL,
+        doc: "ASCII and binary, 2.2 and 4.1; written as 4.1 in ASCII; physical groups are kept as the field `reference`",
+        sniff: gmsh::sniff,
+        read: gmsh::read,
+        write: gmsh::write_version_4,
+    },
+    Entry {
+        format: Format::Gmsh2,
+        name: "Gmsh 2.2",
+        extensions: &["msh2"],
+        cells: &CellKind::ALL,
+        doc: "as Gmsh 4.1, but written as 2.2",
+        sniff: gmsh::sniff,
+        read: gmsh::read,
+        write: gmsh::write_version_2,
+    },
+    Entry {
+        format: Format::Vtk,
+        name: "legacy VTK",
+        extensions: &["vtk"],
+        cells: &CellKind::ALL,
+        doc: "unstructured grids and polygonal data, ASCII and binary; written as an unstructured grid in ASCII",
+        sniff: vtk::sniff,
+        read: vtk::read,
+        write: vtk::write,
+    },
+    Entry {
         format: Format::Vtu,
         name: "VTU",
         extensions: &["vtu"],
@@ -117,6 +162,46 @@ pub const FORMATS: &[Entry] = &[
         sniff: vtu::sniff,
         read: vtu::read,
         write: vtu::write_content,
+    },
+    Entry {
+        format: Format::Off,
+        name: "OFF",
+        extensions: &["off"],
+        cells: &CellKind::SURFACE,
+        doc: "text, with or without colours and normals, which are left out",
+        sniff: off::sniff,
+        read: off::read,
+        write: off::write,
+    },
+    Entry {
+        format: Format::Ply,
+        name: "PLY",
+        extensions: &["ply"],
+        cells: &CellKind::SURFACE,
+        doc: "ASCII and binary with any properties; written in binary",
+        sniff: ply::sniff,
+        read: ply::read,
+        write: ply::write,
+    },
+    Entry {
+        format: Format::Stl,
+        name: "STL",
+        extensions: &["stl"],
+        cells: &[CellKind::Triangle],
+        doc: "ASCII and binary, vertices welded where equal; written in binary",
+        sniff: stl::sniff,
+        read: stl::read,
+        write: stl::write,
+    },
+    Entry {
+        format: Format::Obj,
+        name: "OBJ",
+        extensions: &["obj"],
+        cells: &CellKind::SURFACE,
+        doc: "vertices and faces; groups, materials, normals and textures are left out",
+        sniff: obj::sniff,
+        read: obj::read,
+        write: obj::write,
     },
 ];
 
@@ -235,14 +320,14 @@ pub fn read(name: &str, bytes: &[u8]) -> Result<Content, FormatError> {
             extensions()
         ))),
         Some(format) => (format.entry().read)(bytes).map(|mut content| {
-            if let (Some(named), Some(shown)) = (by_name, by_content)
-                && (named.entry().read as usize) != (shown.entry().read as usize)
+            if let Some(named) = by_name
+                && by_content.is_some()
+                && !(named.entry().sniff)(bytes)
             {
                 content.notices.push(format!(
-                    "the name says {}, the content is {}: read as {}",
+                    "the name says {}, the content is {}: read as that",
                     named.entry().name,
-                    shown.entry().name,
-                    shown.entry().name
+                    format.entry().name
                 ));
             }
             content
@@ -277,7 +362,7 @@ pub fn write(format: Format, content: &Content) -> Result<Written, String> {
             ));
         }
     }
-    Ok((entry.write)(content))
+    (entry.write)(content)
 }
 
 /// The extensions of all formats, for messages.

@@ -72,13 +72,13 @@ impl<'a> Text<'a> {
     }
 
     /// Reads only the part of `bytes` from `start` to `end`; places still count from the start of `bytes`.
-    pub(super) fn part(bytes: &'a [u8], start: usize, end: usize) -> Text<'a> {
+    pub(super) fn part(bytes: &'a [u8], start: usize, end: usize, comment: Option<u8>) -> Text<'a> {
         let end = end.min(bytes.len());
         Text {
             bytes,
             at: start.min(end),
             end,
-            comment: None,
+            comment,
         }
     }
 
@@ -97,7 +97,8 @@ impl<'a> Text<'a> {
         self.end - self.at
     }
 
-    fn skip_blank(&mut self) {
+    /// Passes blanks, ends of lines and comments.
+    pub(super) fn skip_blank(&mut self) {
         while self.at < self.end {
             let byte = self.bytes[self.at];
             if byte.is_ascii_whitespace() {
@@ -132,9 +133,8 @@ impl<'a> Text<'a> {
         (start < self.at).then(|| &self.bytes[start..self.at])
     }
 
-    /// The next word without passing it.
+    /// The next word without passing it, nor the blanks before it, which may belong to binary numbers.
     pub(super) fn peek(&mut self) -> Option<&'a [u8]> {
-        self.skip_blank();
         let start = self.at;
         let word = self.word();
         self.at = start;
@@ -164,6 +164,14 @@ impl<'a> Text<'a> {
             self.at - word.len(),
             format!("{} stands where {what} is expected", shown(word)),
         )
+    }
+
+    /// The error that the next word is not `what`.
+    pub(super) fn next_is_not(&mut self, what: Arguments<'_>) -> Fault {
+        match self.word() {
+            Some(word) => self.not(word, what),
+            None => self.ended(what),
+        }
     }
 
     /// The error that the text ends where `what` is expected.

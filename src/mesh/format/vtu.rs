@@ -14,6 +14,7 @@ use base64::alphabet::STANDARD;
 use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
 use quick_xml::events::{BytesStart, Event};
 use quick_xml::{Reader, XmlVersion};
+use std::cell::Cell;
 use std::fmt::Write as _;
 use std::io::{Read as _, Write as _};
 
@@ -75,6 +76,8 @@ struct File<'a> {
     /// Where the appended data start, and whether they are raw.
     appended: Option<(usize, bool)>,
     notices: Vec<String>,
+    /// The bytes of all arrays decoded so far, as they stand in the file.
+    decoded: Cell<usize>,
 }
 
 /// Reads a file.
@@ -182,6 +185,7 @@ impl<'a> File<'a> {
             arrays: Vec::new(),
             appended: None,
             notices: Vec::new(),
+            decoded: Cell::new(0),
         };
         let mut reader = Reader::from_reader(bytes);
         let mut part = None;
@@ -253,8 +257,7 @@ impl<'a> File<'a> {
                     _ => {}
                 },
                 Event::Text(text) if array_open && inner == 0 => {
-                    let bytes: &[u8] = text.as_ref();
-                    let blank = bytes.trim_ascii().is_empty();
+                    let blank = text.trim_ascii().is_empty();
                     if let Some(array) = file.arrays.last_mut()
                         && !blank
                         && array.end == array.start
@@ -452,7 +455,7 @@ impl<'a> File<'a> {
         count: usize,
         mut next: impl FnMut(&mut Text<'_>, usize) -> Result<T, Fault>,
     ) -> Result<Vec<T>, Fault> {
-        let mut text = Text::part(self.bytes, array.start, array.end);
+        let mut text = Text::part(self.bytes, array.start, array.end, None);
         if count > text.remaining().div_ceil(2) {
             return Err(Fault::text(
                 array.at,
@@ -534,6 +537,7 @@ impl<'a> File<'a> {
             if length != wanted {
                 return Err(contradiction(length));
             }
+            self.account(length).map_err(fault)?;
             let body = &data[self.header.size()..];
             return body.get(..length).map(<[u8]>::to_vec).ok_or_else(cut);
         }
@@ -553,28 +557,41 @@ impl<'a> File<'a> {
         if total != Some(wanted) {
             return Err(contradiction(total.unwrap_or(usize::MAX)));
         }
-        if wanted > data.len().saturating_mul(MOST_GROWTH) {
+        let start = (3 + blocks) * self.header.size();
+        let mut end = start;
+        let mut blocks_at = Vec::with_capacity(blocks);
+        for index in 0..blocks {
+            let next = number(3 + index).and_then(|size| end.checked_add(size));
+            let next = next.filter(|&next| next <= data.len()).ok_or_else(cut)?;
+            blocks_at.push(end..next);
+            end = next;
+        }
+        self.account(end).map_err(fault)?;
+        if wanted > (end - start).saturating_mul(MOST_GROWTH) {
             return Err(cut());
         }
         let mut values = Vec::with_capacity(wanted);
-        let mut start = (3 + blocks) * self.header.size();
-        for index in 0..blocks {
-            let end = number(3 + index)
-                .and_then(|size| start.checked_add(size))
-                .ok_or_else(cut)?;
-            let packed = data.get(start..end).ok_or_else(cut)?;
+        for (index, range) in blocks_at.into_iter().enumerate() {
             let size = if index < whole_blocks { block } else { last };
             let before = values.len();
-            flate2::read::ZlibDecoder::new(packed)
+            flate2::read::ZlibDecoder::new(&data[range])
                 .take(size as u64)
                 .read_to_end(&mut values)
                 .map_err(|error| fault(format!("cannot be decompressed ({error}); restore the file")))?;
             if values.len() - before != size {
                 return Err(cut());
             }
-            start = end;
         }
         Ok(values)
+    }
+
+    /// Keeps arrays that share their place from multiplying the file: the sum of all may be twice its size (base64, decoded).
+    fn account(&self, bytes: usize) -> Result<(), String> {
+        self.decoded.set(self.decoded.get().saturating_add(bytes));
+        if self.decoded.get() > 2 * self.bytes.len() {
+            return Err("overlaps other arrays; each array needs its own place".to_string());
+        }
+        Ok(())
     }
 
     /// The smallest offset of an appended array beyond `offset`.
@@ -590,6 +607,7 @@ impl<'a> File<'a> {
     fn decode_base64(&self, text: &[u8], length: Option<usize>) -> Result<Vec<u8>, String> {
         let text = &text[..length.unwrap_or(text.len()).min(text.len())];
         let end = text.iter().position(|&byte| byte == b'<').unwrap_or(text.len());
+        self.account(end)?;
         let mut letters = text[..end].to_vec();
         letters.retain(|byte| !byte.is_ascii_whitespace());
         let mut decoded = Vec::with_capacity(letters.len() / 4 * 3 + 3);
@@ -677,13 +695,14 @@ pub fn write(
     write_array(&mut out, "Points", "Float64", 3, coordinates);
     out.push_str("</Points>\n<Cells>\n");
     let corners = cells.iter().flat_map(|(_, corners)| corners);
-    write_array(
-        &mut out,
-        "connectivity",
-        "Int64",
-        1,
-        corners.flat_map(|&corner| i64::from(corner).to_le_bytes()),
-    );
+    // VTK takes the type that the file names; half the bytes where indices fit.
+    if points.len() <= i32::MAX as usize {
+        let bytes = corners.flat_map(|&corner| (corner as i32).to_le_bytes());
+        write_array(&mut out, "connectivity", "Int32", 1, bytes);
+    } else {
+        let bytes = corners.flat_map(|&corner| i64::from(corner).to_le_bytes());
+        write_array(&mut out, "connectivity", "Int64", 1, bytes);
+    }
     let offsets = cells.iter().scan(0_i64, |end, (_, corners)| {
         *end += corners.len() as i64;
         Some(*end)
@@ -710,7 +729,7 @@ fn write_array(out: &mut String, name: &str, kind: &str, components: usize, byte
     let mut packed = Vec::with_capacity(bytes.len() / 2);
     for block in bytes.chunks(BLOCK) {
         let before = packed.len();
-        let mut encoder = flate2::write::ZlibEncoder::new(packed, flate2::Compression::default());
+        let mut encoder = flate2::write::ZlibEncoder::new(packed, flate2::Compression::fast());
         let written = encoder.write_all(block).and_then(|()| encoder.finish());
         packed = written.expect("memory takes every byte");
         header.push((packed.len() - before) as u64);
@@ -727,8 +746,8 @@ fn write_array(out: &mut String, name: &str, kind: &str, components: usize, byte
 }
 
 /// Writes the whole of `content`.
-pub(super) fn write_content(content: &Content) -> Written {
-    Written {
+pub(super) fn write_content(content: &Content) -> Result<Written, String> {
+    Ok(Written {
         bytes: write(
             &content.points,
             content.cells(),
@@ -736,7 +755,7 @@ pub(super) fn write_content(content: &Content) -> Written {
             &views(&content.cell_data),
         ),
         notices: Vec::new(),
-    }
+    })
 }
 
 fn views(fields: &[Field]) -> Vec<FieldView<'_>> {

@@ -177,7 +177,7 @@ const SEED: Parameter = Parameter {
     doc: "start of the random numbers behind `jitter`; no effect without it",
 };
 
-/// Bends the body-centred lattice of the unit cube into shape.
+/// Bends the body-centred lattice of the unit cube into shape, relaxes it where it came out poor and applies the jitter.
 ///
 /// `extents` are the rough sizes of the shape along the cube's axes and set the numbers of boxes; `bend` takes a point
 /// of the cube `[-1, 1]^3`.
@@ -187,11 +187,16 @@ fn bend_lattice(grid: &Grid, extents: [f64; 3], bend: impl Fn([f64; 3]) -> [f64;
     for point in &mut mesh.points {
         *point = bend(point.map(|coordinate| 2.0 * coordinate - 1.0));
     }
-    finish(mesh, natural, grid.jitter, grid.seed)
+    let mut interior = Interior::of(mesh);
+    interior.relax();
+    if grid.jitter > 0.0 {
+        interior.shake(grid.jitter, grid.seed);
+    }
+    valid(interior.mesh, natural)
 }
 
-/// Checks that no tetrahedron is inverted and applies the jitter.
-fn finish(mut mesh: TetrahedralMesh, natural: Vec<[f64; 3]>, jitter: f64, seed: u64) -> Result<Generated, String> {
+/// Passes a mesh on whose tetrahedra are all positive.
+fn valid(mesh: TetrahedralMesh, natural: Vec<[f64; 3]>) -> Result<Generated, String> {
     let inverted = mesh
         .cells
         .iter()
@@ -203,54 +208,137 @@ fn finish(mut mesh: TetrahedralMesh, natural: Vec<[f64; 3]>, jitter: f64, seed: 
             "{inverted} of {total} generated tetrahedra are flat or inverted; ask for more tetrahedra or a milder shape"
         ));
     }
-    if jitter > 0.0 {
-        shake(&mut mesh, jitter, seed);
-    }
     Ok(Generated {
         mesh,
         natural: Some(natural),
     })
 }
 
-/// Moves each interior vertex by a random vector inside a ball of `jitter` times its shortest edge. A move that would
-/// take a tetrahedron below both a scaled Jacobian of 0.05 and its present one is halved, and given up after six halvings.
-fn shake(mesh: &mut TetrahedralMesh, jitter: f64, seed: u64) {
-    let vertices = mesh.points.len();
-    let boundary = connectivity::boundary(&mesh.cells, vertices);
-    let around = connectivity::incidence(&mesh.cells, vertices);
-    let mut random = SplitMix::new(seed);
-    for vertex in 0..vertices {
-        // Numbers are drawn for every vertex, so that one refused move does not change the others.
-        let direction = loop {
-            let candidate: [f64; 3] = std::array::from_fn(|_| 2.0 * random.unit() - 1.0);
-            if length(candidate) <= 1.0 {
-                break candidate;
-            }
-        };
-        if boundary.mask[vertex] {
-            continue;
+/// A mesh whose interior vertices may move.
+struct Interior {
+    mesh: TetrahedralMesh,
+    on_boundary: Vec<bool>,
+    around: connectivity::Rows,
+}
+
+/// Tetrahedra with a smaller scaled Jacobian are worth improving.
+const POOR: f64 = 0.3;
+
+impl Interior {
+    fn of(mesh: TetrahedralMesh) -> Self {
+        let vertices = mesh.points.len();
+        let on_boundary = connectivity::boundary(&mesh.cells, vertices).mask;
+        Self {
+            on_boundary,
+            around: connectivity::incidence(&mesh.cells, vertices),
+            mesh,
         }
-        let here = mesh.points[vertex];
-        let cells = around.row(vertex);
-        let worst = |points: &[[f64; 3]]| {
-            let quality = |&cell: &u32| scaled_jacobian(mesh.cells[cell as usize].map(|v| points[v as usize]));
-            cells.iter().map(quality).fold(f64::INFINITY, f64::min)
-        };
-        let shortest = cells
+    }
+
+    /// The scaled Jacobians around a vertex.
+    fn qualities(&self, vertex: usize) -> impl Iterator<Item = f64> {
+        let cells = self.around.row(vertex).iter();
+        cells.map(|&cell| scaled_jacobian(self.mesh.corners(self.mesh.cells[cell as usize])))
+    }
+
+    /// The smallest scaled Jacobian around a vertex.
+    fn worst(&self, vertex: usize) -> f64 {
+        self.qualities(vertex).fold(f64::INFINITY, f64::min)
+    }
+
+    /// The shortest edge at a vertex.
+    fn shortest(&self, vertex: usize) -> f64 {
+        let here = self.mesh.points[vertex];
+        let others = self
+            .around
+            .row(vertex)
             .iter()
-            .flat_map(|&cell| mesh.cells[cell as usize])
+            .flat_map(|&cell| self.mesh.cells[cell as usize]);
+        others
             .filter(|&other| other as usize != vertex)
-            .map(|other| length(subtract(mesh.points[other as usize], here)))
-            .fold(f64::INFINITY, f64::min);
-        let floor = worst(&mesh.points).min(0.05);
-        let mut step = jitter * shortest;
-        for _ in 0..7 {
-            mesh.points[vertex] = std::array::from_fn(|axis| here[axis] + step * direction[axis]);
-            if worst(&mesh.points) >= floor {
+            .map(|other| length(subtract(self.mesh.points[other as usize], here)))
+            .fold(f64::INFINITY, f64::min)
+    }
+
+    /// Raises the smallest scaled Jacobian around each interior vertex where it is [`POOR`], by a search along the axes
+    /// with falling steps; at most eight sweeps, each over the vertices around which something has moved.
+    fn relax(&mut self) {
+        let mut due: Vec<bool> = self.on_boundary.iter().map(|on| !on).collect();
+        for _ in 0..8 {
+            let mut moved = false;
+            for vertex in 0..due.len() {
+                if std::mem::take(&mut due[vertex]) && self.improve(vertex) {
+                    moved = true;
+                    for &cell in self.around.row(vertex) {
+                        for other in self.mesh.cells[cell as usize] {
+                            due[other as usize] = !self.on_boundary[other as usize];
+                        }
+                    }
+                }
+            }
+            if !moved {
                 break;
             }
-            mesh.points[vertex] = here;
-            step /= 2.0;
+        }
+    }
+
+    /// Moves one vertex to a better place, if it needs one and there is one near.
+    fn improve(&mut self, vertex: usize) -> bool {
+        let mut best = self.worst(vertex);
+        if best >= POOR {
+            return false;
+        }
+        let mut step = 0.3 * self.shortest(vertex);
+        let mut moved = false;
+        for _ in 0..6 {
+            let mut better = false;
+            for axis in 0..3 {
+                for sign in [-1.0, 1.0] {
+                    let here = self.mesh.points[vertex];
+                    self.mesh.points[vertex][axis] += sign * step;
+                    if self.qualities(vertex).all(|quality| quality > best + 1e-4) {
+                        best = self.worst(vertex);
+                        better = true;
+                    } else {
+                        self.mesh.points[vertex] = here;
+                    }
+                }
+            }
+            moved |= better;
+            if !better {
+                step /= 2.0;
+            }
+        }
+        moved
+    }
+
+    /// Moves each interior vertex by a random vector inside a ball of `jitter` times its shortest edge. A move that
+    /// would take a tetrahedron below both a scaled Jacobian of 0.05 and its present one is halved, and given up after
+    /// six halvings.
+    fn shake(&mut self, jitter: f64, seed: u64) {
+        let mut random = SplitMix(seed);
+        for vertex in 0..self.mesh.points.len() {
+            // Numbers are drawn for every vertex, so that one refused move does not change the others.
+            let direction = loop {
+                let candidate: [f64; 3] = std::array::from_fn(|_| 2.0 * random.unit() - 1.0);
+                if length(candidate) <= 1.0 {
+                    break candidate;
+                }
+            };
+            if self.on_boundary[vertex] {
+                continue;
+            }
+            let here = self.mesh.points[vertex];
+            let floor = self.worst(vertex).min(0.05);
+            let mut step = jitter * self.shortest(vertex);
+            for _ in 0..7 {
+                self.mesh.points[vertex] = std::array::from_fn(|axis| here[axis] + step * direction[axis]);
+                if self.worst(vertex) >= floor {
+                    break;
+                }
+                self.mesh.points[vertex] = here;
+                step /= 2.0;
+            }
         }
     }
 }
@@ -260,10 +348,6 @@ fn shake(mesh: &mut TetrahedralMesh, jitter: f64, seed: u64) {
 struct SplitMix(u64);
 
 impl SplitMix {
-    fn new(seed: u64) -> Self {
-        Self(seed)
-    }
-
     /// Uniform in `[0, 1)`, with 53 random bits.
     fn unit(&mut self) -> f64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);

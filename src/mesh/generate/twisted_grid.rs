@@ -1,6 +1,6 @@
 //! A bumpy twisted ball on a Kuhn grid: the mesh on which published figures of foldings are compared.
 
-use super::{Arguments, Generated, Generator, Parameter, bumpy, finish, lattice};
+use super::{Arguments, Generated, Generator, Parameter, bumpy, lattice, valid};
 use crate::mesh::{length, split};
 
 /// A Kuhn grid of the cube, rounded halfway into a ball, given bumps, twisted and stretched; then freed from its boundary
@@ -52,7 +52,7 @@ impl TwistedGrid {
         }
         let refined = split::separate_boundary(&mesh);
         refined.carry(&mut natural);
-        finish(refined.mesh, natural, 0.0, 0)
+        valid(refined.mesh, natural)
     }
 }
 

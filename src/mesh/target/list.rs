@@ -19,10 +19,7 @@ pub fn parse(text: &str, boundary: &Boundary, scale: f64) -> Result<Target, Stri
     // Line of each vertex's entry, counted from 1; 0 when there is none.
     let mut lines = vec![0usize; vertices];
     let mut positions = vec![[f64::NAN; 3]; boundary.vertices.len()];
-    let mut place = vec![u32::MAX; vertices];
-    for (index, &vertex) in boundary.vertices.iter().enumerate() {
-        place[vertex as usize] = index as u32;
-    }
+    let place = boundary.places();
     for (number, line) in (1..).zip(text.lines()) {
         let content = line.split('#').next().unwrap_or_default();
         let words: Vec<&str> = content.split_whitespace().collect();

@@ -4,7 +4,10 @@
 //! A generated shape is checked: every boundary triangle has positive area on its side, seen from outside. Positions from
 //! files are only checked to be complete and finite; whether a map onto them can be free of folds is for the method.
 
+mod harmonic;
+mod layout;
 pub mod list;
+pub mod polyhedron;
 
 use super::connectivity::Boundary;
 use super::generate::{Arguments, Parameter};
@@ -101,6 +104,14 @@ struct Surface<'a> {
     natural: Option<&'a [[f64; 3]]>,
 }
 
+const RADIUS: Parameter = Parameter {
+    name: "radius",
+    whole: false,
+    default: 1.0,
+    min: 1e-6,
+    max: 1e6,
+    doc: "distance of the corners from the centre, in model units",
+};
 const SWIRL: Parameter = Parameter {
     name: "swirl",
     whole: false,
@@ -155,6 +166,24 @@ pub fn shapes() -> &'static [Shape] {
             ],
             build: sphere,
         },
+        Shape {
+            name: "octahedron",
+            doc: "the octahedron around the origin, laid over the surface",
+            parameters: &[RADIUS],
+            build: |surface, arguments| scaled(surface, &polyhedron::OCTAHEDRON, arguments.number("radius")),
+        },
+        Shape {
+            name: "tetrahedron",
+            doc: "the regular tetrahedron around the origin, laid over the surface",
+            parameters: &[RADIUS],
+            build: |surface, arguments| {
+                scaled(
+                    surface,
+                    &polyhedron::TETRAHEDRON,
+                    arguments.number("radius") / 3.0f64.sqrt(),
+                )
+            },
+        },
     ];
     ALL
 }
@@ -191,23 +220,147 @@ pub fn shape(
 
 /// Positions on the unit cube for the boundary vertices, swirled and warped as asked.
 fn unit_cube(surface: &Surface, arguments: &Arguments) -> Result<Vec<[f64; 3]>, String> {
-    let natural = surface.natural.ok_or("this mesh has no natural position on a cube")?;
-    if natural.len() != surface.mesh.points.len() {
-        let (given, wanted) = (natural.len(), surface.mesh.points.len());
-        return Err(format!(
-            "{given} positions on the cube are given for a mesh with {wanted} vertices"
-        ));
-    }
-    let plain = surface.boundary.vertices.iter().map(|&vertex| natural[vertex as usize]);
+    let plain = match surface.natural {
+        Some(natural) if natural.len() != surface.mesh.points.len() => {
+            let (given, wanted) = (natural.len(), surface.mesh.points.len());
+            return Err(format!(
+                "{given} positions on the cube are given for a mesh with {wanted} vertices"
+            ));
+        }
+        Some(natural) => surface
+            .boundary
+            .vertices
+            .iter()
+            .map(|&vertex| natural[vertex as usize])
+            .collect(),
+        None => laid(surface, &polyhedron::CUBE)?
+            .iter()
+            .map(|point| point.map(|coordinate| 0.5 * (coordinate + 1.0)))
+            .collect::<Vec<_>>(),
+    };
     let (swirl, warp) = (arguments.number("swirl"), arguments.number("warp"));
-    let positions: Vec<[f64; 3]> = plain.map(|point| disturb(point, swirl, warp)).collect();
-    let inverted = inverted_about(surface.boundary, &positions, [0.5; 3]);
+    if swirl == 0.0 && warp == 0.0 {
+        return valid(surface, plain, [0.5; 3], "refine the mesh");
+    }
+    let mut disturbed: Vec<[f64; 3]> = plain.iter().map(|&point| disturb(point, swirl, warp)).collect();
+    if !inverted_about(surface.boundary, &disturbed, [0.5; 3]).is_empty() {
+        unfold(surface.boundary, &mut disturbed);
+    }
+    valid(
+        surface,
+        disturbed,
+        [0.5; 3],
+        "lower `swirl` and `warp` or refine the mesh",
+    )
+}
+
+/// Moves vertices within the sides of the unit cube until no triangle is inverted, if it can: a disturbance that is one to
+/// one for points may be more than large triangles can follow.
+///
+/// Only vertices of poor triangles (shape below 0.05) move, each to where the smallest shape around it is largest, by a
+/// search along the two axes of its side with falling steps.
+fn unfold(boundary: &Boundary, positions: &mut [[f64; 3]]) {
+    const POOR: f64 = 0.05;
+    let place = boundary.places();
+    let triangles: Vec<[u32; 3]> = boundary
+        .triangles
+        .iter()
+        .map(|t| t.map(|vertex| place[vertex as usize]))
+        .collect();
+    let around = super::connectivity::incidence(&triangles, positions.len());
+    // Twice the area towards the outside of the cube over the mean squared edge: about 1 for a good triangle.
+    let shape = |positions: &[[f64; 3]], triangle: u32| {
+        let corners = triangles[triangle as usize].map(|vertex| positions[vertex as usize]);
+        let squares = (0..3).map(|i| {
+            let edge = super::subtract(corners[(i + 1) % 3], corners[i]);
+            super::dot(edge, edge)
+        });
+        let middle: [f64; 3] = std::array::from_fn(|axis| corners.iter().map(|p| p[axis]).sum::<f64>() / 3.0 - 0.5);
+        let normal = super::area_vector(corners);
+        let turned = if super::dot(normal, middle) > 0.0 { 1.0 } else { -1.0 };
+        turned * super::length(normal) * 3.0 / squares.sum::<f64>().max(f64::MIN_POSITIVE)
+    };
+    let worst = |positions: &[[f64; 3]], vertex: usize| {
+        around
+            .row(vertex)
+            .iter()
+            .map(|&triangle| shape(positions, triangle))
+            .fold(f64::INFINITY, f64::min)
+    };
+    for _ in 0..200 {
+        let mut moved = false;
+        for vertex in 0..positions.len() {
+            // On an edge or corner of the cube more than one coordinate is held.
+            let free: Vec<usize> = (0..3)
+                .filter(|&a| positions[vertex][a] != 0.0 && positions[vertex][a] != 1.0)
+                .collect();
+            let mut best = worst(positions, vertex);
+            if free.len() != 2 || best >= POOR {
+                continue;
+            }
+            let edges = around
+                .row(vertex)
+                .iter()
+                .flat_map(|&triangle| triangles[triangle as usize]);
+            let reach = edges.map(|v| super::length(super::subtract(positions[v as usize], positions[vertex])));
+            let mut step = 0.5 * reach.fold(0.0, f64::max);
+            for _ in 0..12 {
+                let before = best;
+                for &axis in &free {
+                    for sign in [-1.0, 1.0] {
+                        let here = positions[vertex];
+                        positions[vertex][axis] = (here[axis] + sign * step).clamp(1e-6, 1.0 - 1e-6);
+                        let reached = worst(positions, vertex);
+                        if reached > best + 1e-6 {
+                            best = reached;
+                            moved = true;
+                        } else {
+                            positions[vertex] = here;
+                        }
+                    }
+                }
+                if best == before {
+                    step /= 2.0;
+                }
+            }
+        }
+        if !moved {
+            return;
+        }
+    }
+}
+
+/// Positions on a polyhedron around the origin for the boundary vertices.
+fn laid(surface: &Surface, polyhedron: &polyhedron::Polyhedron) -> Result<Vec<[f64; 3]>, String> {
+    let vertices = &surface.boundary.vertices;
+    let place = surface.boundary.places();
+    let points: Vec<[f64; 3]> = vertices
+        .iter()
+        .map(|&vertex| surface.mesh.points[vertex as usize])
+        .collect();
+    let triangles = surface
+        .boundary
+        .triangles
+        .iter()
+        .map(|triangle| triangle.map(|vertex| place[vertex as usize]));
+    let positions = polyhedron::lay(polyhedron, &points, &triangles.collect::<Vec<_>>())?;
+    valid(
+        surface,
+        positions,
+        [0.0; 3],
+        "refine the mesh or give the target as a file of boundary positions",
+    )
+}
+
+/// Passes positions on that turn every boundary triangle's front away from `centre`.
+fn valid(surface: &Surface, positions: Vec<[f64; 3]>, centre: [f64; 3], mend: &str) -> Result<Vec<[f64; 3]>, String> {
+    let inverted = inverted_about(surface.boundary, &positions, centre);
     match inverted.first() {
         None => Ok(positions),
         Some(first) => Err(format!(
-            "{} boundary triangles are inverted or flat on the cube, the first with vertices {:?}; lower `swirl` and \
-             `warp` or refine the mesh",
+            "{} of {} boundary triangles are inverted or flat on the target, the first with vertices {:?}; {mend}",
             inverted.len(),
+            surface.boundary.triangles.len(),
             surface.boundary.triangles[*first as usize]
         )),
     }
@@ -233,10 +386,7 @@ fn disturb(point: [f64; 3], swirl: f64, warp: f64) -> [f64; 3] {
 /// Boundary triangles that do not turn their front away from `centre`. For positions on a surface that is star-shaped
 /// around it, such as a convex one, a map without any is locally one to one.
 pub fn inverted_about(boundary: &Boundary, positions: &[[f64; 3]], centre: [f64; 3]) -> Vec<u32> {
-    let mut place = vec![0u32; boundary.mask.len()];
-    for (index, &vertex) in boundary.vertices.iter().enumerate() {
-        place[vertex as usize] = index as u32;
-    }
+    let place = boundary.places();
     (0..boundary.triangles.len() as u32)
         .filter(|&triangle| {
             let [a, b, c] =
@@ -267,6 +417,18 @@ fn sphere(surface: &Surface, arguments: &Arguments) -> Result<Target, String> {
         let direction = point.map(|coordinate| 2.0 * coordinate - 1.0);
         let scale = radius / super::length(direction);
         *point = direction.map(|coordinate| scale * coordinate);
+    }
+    Ok(Target {
+        positions,
+        interior: None,
+    })
+}
+
+/// The polyhedron with its coordinates multiplied by `scale`.
+fn scaled(surface: &Surface, polyhedron: &polyhedron::Polyhedron, scale: f64) -> Result<Target, String> {
+    let mut positions = laid(surface, polyhedron)?;
+    for point in &mut positions {
+        *point = point.map(|coordinate| scale * coordinate);
     }
     Ok(Target {
         positions,

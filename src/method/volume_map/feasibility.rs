@@ -40,18 +40,28 @@ pub struct PlanarFaces {
 impl PlanarFaces {
     /// Whether all these vertices lie on one planar face.
     fn common(&self, vertices: &[u32]) -> bool {
-        let Some((&first, others)) = vertices.split_first() else { return false };
-        self.of_vertex[first as usize]
-            .iter()
-            .any(|face| others.iter().all(|&vertex| self.of_vertex[vertex as usize].contains(face)))
+        let Some((&first, others)) = vertices.split_first() else {
+            return false;
+        };
+        self.of_vertex[first as usize].iter().any(|face| {
+            others
+                .iter()
+                .all(|&vertex| self.of_vertex[vertex as usize].contains(face))
+        })
     }
 }
 
 /// Finds the planar faces of the boundary's image. `positions` holds a point for every vertex of the mesh.
 pub fn planar_faces(triangles: &[[u32; 3]], positions: &[[f64; 3]]) -> PlanarFaces {
     let corners = |triangle: u32| triangles[triangle as usize].map(|vertex| positions[vertex as usize]);
-    let vectors: Vec<[f64; 3]> = (0..triangles.len() as u32).map(|index| mesh::area_vector(corners(index))).collect();
-    let on_boundary: Vec<[f64; 3]> = triangles.iter().flatten().map(|&vertex| positions[vertex as usize]).collect();
+    let vectors: Vec<[f64; 3]> = (0..triangles.len() as u32)
+        .map(|index| mesh::area_vector(corners(index)))
+        .collect();
+    let on_boundary: Vec<[f64; 3]> = triangles
+        .iter()
+        .flatten()
+        .map(|&vertex| positions[vertex as usize])
+        .collect();
     let tolerance = PLANE_TOLERANCE * mesh::diagonal(&on_boundary);
     let facets = connectivity::facets(triangles, positions.len());
 
@@ -103,8 +113,15 @@ pub fn planar_faces(triangles: &[[u32; 3]], positions: &[[f64; 3]]) -> PlanarFac
         }
         let size = mesh::length(sum);
         let normal = sum.map(|component| component / size);
-        let shown: f64 = region.iter().map(|&index| mesh::dot(vectors[index as usize], normal)).sum();
-        normals.push(if shown < 0.0 { normal.map(|component| -component) } else { normal });
+        let shown: f64 = region
+            .iter()
+            .map(|&index| mesh::dot(vectors[index as usize], normal))
+            .sum();
+        normals.push(if shown < 0.0 {
+            normal.map(|component| -component)
+        } else {
+            normal
+        });
         for &index in &region {
             of_triangle[index as usize] = normals.len() as u32 - 1;
         }
@@ -119,7 +136,12 @@ pub fn planar_faces(triangles: &[[u32; 3]], positions: &[[f64; 3]]) -> PlanarFac
             }
         }
     }
-    PlanarFaces { count: normals.len(), of_triangle, normals, of_vertex }
+    PlanarFaces {
+        count: normals.len(),
+        of_triangle,
+        normals,
+        of_vertex,
+    }
 }
 
 /// What the boundary forces, by vertices of the mesh.
@@ -210,7 +232,10 @@ pub fn check(source: &TetrahedralMesh, boundary: &Boundary, positions: &[[f64; 3
         if face == NONE {
             continue;
         }
-        let side = side(triangle.map(|vertex| positions[vertex as usize]), planar.normals[face as usize]);
+        let side = side(
+            triangle.map(|vertex| positions[vertex as usize]),
+            planar.normals[face as usize],
+        );
         if side < 0.0 {
             inverted_triangles.push(triangle);
         } else if side == 0.0 {
@@ -242,9 +267,18 @@ pub fn check(source: &TetrahedralMesh, boundary: &Boundary, positions: &[[f64; 3
 
 /// Sign of the triangle seen against `normal`: its exact orientation in the coordinate plane that the normal faces most.
 fn side(corners: [[f64; 3]; 3], normal: [f64; 3]) -> f64 {
-    let axis = (0..3).fold(0, |best, axis| if normal[axis].abs() > normal[best].abs() { axis } else { best });
+    let axis = (0..3).fold(0, |best, axis| {
+        if normal[axis].abs() > normal[best].abs() {
+            axis
+        } else {
+            best
+        }
+    });
     let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
-    let [a, b, c] = corners.map(|point| robust::Coord { x: point[u], y: point[v] });
+    let [a, b, c] = corners.map(|point| robust::Coord {
+        x: point[u],
+        y: point[v],
+    });
     let turn = robust::orient2d(a, b, c);
     if normal[axis] < 0.0 { -turn } else { turn }
 }

@@ -24,10 +24,13 @@ pub fn extend<const C: usize>(
         let six_volumes = mesh::determinant(corners);
         // Area vectors of the faces are the gradients of the barycentric coordinates times the determinant.
         let opposite = |face: [usize; 3]| mesh::area_vector(face.map(|corner| corners[corner]));
-        let gradients = [opposite([1, 3, 2]), opposite([0, 2, 3]), opposite([0, 3, 1]), opposite([0, 1, 2])];
-        std::array::from_fn(|a| {
-            std::array::from_fn(|b| mesh::dot(gradients[a], gradients[b]) / (6.0 * six_volumes))
-        })
+        let gradients = [
+            opposite([1, 3, 2]),
+            opposite([0, 2, 3]),
+            opposite([0, 3, 1]),
+            opposite([0, 1, 2]),
+        ];
+        std::array::from_fn(|a| std::array::from_fn(|b| mesh::dot(gradients[a], gradients[b]) / (6.0 * six_volumes)))
     };
     solve(source, on_boundary, values, stiffness)
 }
@@ -49,7 +52,10 @@ fn solve<const C: usize>(
     values: &mut [[f64; C]],
     stiffness: impl Fn(&[u32; 4]) -> Stiffness + Sync,
 ) -> Result<(), Failure> {
-    let failure = |reason: String| Failure { kind: "invalid-input".to_string(), reason };
+    let failure = |reason: String| Failure {
+        kind: "invalid-input".to_string(),
+        reason,
+    };
     let free: Vec<bool> = on_boundary.iter().map(|&fixed| !fixed).collect();
     let pattern = BlockPattern::<1>::new(&source.points, &source.cells, &free)
         .map_err(|error| failure(format!("the source mesh gives no linear system: {error}")))?;

@@ -29,6 +29,10 @@ pub fn minimize(
         ..Lbfgs::default()
     };
     let x = objective.unknowns(start);
-    let mut recorder = Recorder { latest: objective.latest(), observer, trace };
+    let mut recorder = Recorder {
+        latest: objective.latest(),
+        observer,
+        trace,
+    };
     lbfgs.minimize(objective, x, &mut recorder)
 }

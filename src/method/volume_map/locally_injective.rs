@@ -57,14 +57,25 @@ pub fn minimize(
     let mut step = 0.0;
     let mut before: Option<f64> = None;
     let (mut stop, mut reason) = loop {
-        objective.set_pull(Some(Pull { weight, targets: problem.targets.clone() }));
+        objective.set_pull(Some(Pull {
+            weight,
+            targets: problem.targets.clone(),
+        }));
         evaluations += 1;
         let value = objective.assemble(&x, &mut gradient, 1.0);
         let gradient_norm = norm(&gradient);
         if !value.is_finite() || !gradient_norm.is_finite() {
-            break (StopReason::NotFinite, "the energy or its gradient is not a finite number".to_string());
+            break (
+                StopReason::NotFinite,
+                "the energy or its gradient is not a finite number".to_string(),
+            );
         }
-        let iterate = Iterate { iteration: iterations, energy: value, gradient_norm, step };
+        let iterate = Iterate {
+            iteration: iterations,
+            energy: value,
+            gradient_norm,
+            step,
+        };
         let evaluation = objective.describe(&x);
         trace.record(&iterate, &evaluation);
         observer.iterate(&iterate);
@@ -74,13 +85,19 @@ pub fn minimize(
         }
         let change = before.map_or(f64::INFINITY, |before| before - value);
         if change.abs() < CHANGE * value.abs() {
-            break (StopReason::Converged, format!("relative energy change is below {CHANGE:e}"));
+            break (
+                StopReason::Converged,
+                format!("relative energy change is below {CHANGE:e}"),
+            );
         }
         if let Some(stop) = observer.stop() {
             break (stop, "stopped from outside".to_string());
         }
         if iterations >= settings.iterations {
-            break (StopReason::StepLimit, format!("{} iterations were not enough", settings.iterations));
+            break (
+                StopReason::StepLimit,
+                format!("{} iterations were not enough", settings.iterations),
+            );
         }
 
         let diagonal = objective.mean_diagonal();
@@ -95,7 +112,10 @@ pub fn minimize(
             }
         };
         if !factorized {
-            break (StopReason::Stalled, "no shift makes the Hessian positive definite".to_string());
+            break (
+                StopReason::Stalled,
+                "no shift makes the Hessian positive definite".to_string(),
+            );
         }
         if mu > 0.0 {
             shifts += 1;
@@ -103,10 +123,14 @@ pub fn minimize(
         if mu > 0.0 && options.substepping {
             let share = 1.0 / (1.0 + mu * mu);
             let present = objective.positions(&x);
-            let targets = problem.targets.iter().zip(&present).map(|(target, here)| {
-                std::array::from_fn(|axis| share * target[axis] + (1.0 - share) * here[axis])
-            });
-            objective.set_pull(Some(Pull { weight, targets: targets.collect() }));
+            let targets =
+                problem.targets.iter().zip(&present).map(|(target, here)| {
+                    std::array::from_fn(|axis| share * target[axis] + (1.0 - share) * here[axis])
+                });
+            objective.set_pull(Some(Pull {
+                weight,
+                targets: targets.collect(),
+            }));
         }
         evaluations += 1;
         let toward = objective.gradient(&x, &mut gradient);
@@ -115,15 +139,26 @@ pub fn minimize(
         }
         objective.solve(&mut direction);
         let search = Backtracking::default();
-        let from = Start { x: &x, value: toward, gradient: &gradient, direction: &direction };
+        let from = Start {
+            x: &x,
+            value: toward,
+            gradient: &gradient,
+            direction: &direction,
+        };
         let Some(accepted) = search.search(objective, from, &mut point, &mut ahead, &mut evaluations) else {
-            break (StopReason::Stalled, format!("no step is acceptable at weight {weight:.3e}"));
+            break (
+                StopReason::Stalled,
+                format!("no step is acceptable at weight {weight:.3e}"),
+            );
         };
         std::mem::swap(&mut x, &mut point);
         step = accepted.length;
         iterations += 1;
         // Compared with the energy at the same weight and the final targets.
-        objective.set_pull(Some(Pull { weight, targets: problem.targets.clone() }));
+        objective.set_pull(Some(Pull {
+            weight,
+            targets: problem.targets.clone(),
+        }));
         before = Some(value);
         let evaluation = objective.describe(&x);
         if evaluation.positional > options.constraint_tolerance {
@@ -143,5 +178,12 @@ pub fn minimize(
             options.constraint_tolerance
         );
     }
-    LocallyInjectiveMap { positions: objective.positions(&x), stop, reason, iterations, evaluations, shifts }
+    LocallyInjectiveMap {
+        positions: objective.positions(&x),
+        stop,
+        reason,
+        iterations,
+        evaluations,
+        shifts,
+    }
 }

@@ -11,7 +11,14 @@ const fn metric(
     better: Better,
     definition: &'static str,
 ) -> Metric {
-    Metric { name, symbol, unit: "", floor, better, definition }
+    Metric {
+        name,
+        symbol,
+        unit: "",
+        floor,
+        better,
+        definition,
+    }
 }
 
 const FIXED: &[Metric] = &[
@@ -74,7 +81,13 @@ const FIXED: &[Metric] = &[
         Better::Lower,
         "Maximum volume distortion after the source is scaled to the volume of the target.",
     ),
-    metric("inverted", "N_inv", Some(0.0), Better::Lower, "Number of tetrahedra with a negative determinant."),
+    metric(
+        "inverted",
+        "N_inv",
+        Some(0.0),
+        Better::Lower,
+        "Number of tetrahedra with a negative determinant.",
+    ),
     metric(
         "degenerate",
         "N_flat",
@@ -141,9 +154,27 @@ const FIXED: &[Metric] = &[
         Better::Neither,
         "Volume within the target boundary over the volume of the source, in the units of the files.",
     ),
-    metric("vertices", "N_v", None, Better::Neither, "Number of vertices, after splits."),
-    metric("tetrahedra", "N_t", None, Better::Neither, "Number of tetrahedra, after splits."),
-    metric("boundary_vertices", "N_b", None, Better::Neither, "Number of vertices on the boundary."),
+    metric(
+        "vertices",
+        "N_v",
+        None,
+        Better::Neither,
+        "Number of vertices, after splits.",
+    ),
+    metric(
+        "tetrahedra",
+        "N_t",
+        None,
+        Better::Neither,
+        "Number of tetrahedra, after splits.",
+    ),
+    metric(
+        "boundary_vertices",
+        "N_b",
+        None,
+        Better::Neither,
+        "Number of vertices on the boundary.",
+    ),
 ];
 
 /// The metrics above, and the mean of every energy density on the map, so that maps of different energies compare.

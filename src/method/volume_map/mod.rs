@@ -121,19 +121,31 @@ pub fn run(problem: &Problem, settings: &Settings, observer: &mut dyn Observer) 
                     "the boundary forces at least {bound} inverted {tetrahedra} (vertices and tetrahedra counted from 0): {}; \
                      mend the target{}, or set on_infeasible = \"continue\"",
                     sentences.join("; "),
-                    if settings.split == settings::Split::None { ", allow splits with split = \"needed\"" } else { "" }
+                    if settings.split == settings::Split::None {
+                        ", allow splits with split = \"needed\""
+                    } else {
+                        ""
+                    }
                 ),
             });
         }
-        notices.push(format!("the boundary forces at least {bound} inverted {tetrahedra}: {}", sentences.join("; ")));
+        notices.push(format!(
+            "the boundary forces at least {bound} inverted {tetrahedra}: {}",
+            sentences.join("; ")
+        ));
     } else {
         notices.extend(sentences);
     }
 
     observer.phase("start");
     let mut positions = start::positions(problem, settings)?;
-    let mapping = MappingEnergy::new(&problem.source, &problem.weights(settings.weighting), density, None)
-        .map_err(|error| Failure { kind: "invalid-input".to_string(), reason: format!("source mesh: {error}") })?;
+    let mapping =
+        MappingEnergy::new(&problem.source, &problem.weights(settings.weighting), density, None).map_err(|error| {
+            Failure {
+                kind: "invalid-input".to_string(),
+                reason: format!("source mesh: {error}"),
+            }
+        })?;
     let mut determinants = vec![0.0; mapping.cells()];
     mapping.determinants(positions.as_flattened(), &mut determinants);
     let folded = determinants.iter().filter(|&&determinant| !(determinant > 0.0)).count();
@@ -170,7 +182,16 @@ pub fn run(problem: &Problem, settings: &Settings, observer: &mut dyn Observer) 
                 untangled.left.len(),
                 shown.join(", ")
             );
-            return finish(problem, settings, &positions, (stop, reason), trace, counters, notices, observer);
+            return finish(
+                problem,
+                settings,
+                &positions,
+                (stop, reason),
+                trace,
+                counters,
+                notices,
+                observer,
+            );
         }
     }
 
@@ -198,14 +219,25 @@ pub fn run(problem: &Problem, settings: &Settings, observer: &mut dyn Observer) 
 
     observer.phase("minimize");
     let hard = settings.solver.hard_constraints();
-    let free: Vec<bool> = problem.boundary.mask.iter().map(|&on_boundary| !(hard && on_boundary)).collect();
+    let free: Vec<bool> = problem
+        .boundary
+        .mask
+        .iter()
+        .map(|&on_boundary| !(hard && on_boundary))
+        .collect();
     let hessian = match settings.solver {
         Solver::ProjectedNewton => settings.projected_newton.hessian,
         Solver::RelaxedNewton => settings.relaxed_newton.hessian,
         Solver::LocallyInjective | Solver::LBfgs => Hessian::Projected,
     };
-    let mut objective =
-        MapObjective::new(mapping, &problem.source, &free, &problem.boundary.vertices, &positions, hessian)?;
+    let mut objective = MapObjective::new(
+        mapping,
+        &problem.source,
+        &free,
+        &problem.boundary.vertices,
+        &positions,
+        hessian,
+    )?;
     let end = match settings.solver {
         Solver::ProjectedNewton | Solver::LBfgs => {
             let solution = if settings.solver == Solver::LBfgs {
@@ -219,8 +251,7 @@ pub fn run(problem: &Problem, settings: &Settings, observer: &mut dyn Observer) 
             (solution.stop, solution.reason)
         }
         Solver::RelaxedNewton => {
-            let relaxed =
-                relaxed_newton::minimize(&mut objective, problem, settings, &positions, observer, &mut trace);
+            let relaxed = relaxed_newton::minimize(&mut objective, problem, settings, &positions, observer, &mut trace);
             positions = relaxed.positions;
             counters.set("iterations", relaxed.iterations);
             counters.set("relaxations", relaxed.relaxations);
@@ -250,7 +281,10 @@ fn density(problem: &Problem, settings: &Settings) -> Result<Density, Failure> {
     if !settings.with_barrier() {
         return Ok(density);
     }
-    let width = settings.barrier_width.as_f64().unwrap_or_else(|| problem.mean_determinant());
+    let width = settings
+        .barrier_width
+        .as_f64()
+        .unwrap_or_else(|| problem.mean_determinant());
     Ok(density.with_barrier(settings.barrier_weight, LimBarrier::new(width)))
 }
 
@@ -285,16 +319,31 @@ fn finish(
 
 /// Names and meanings of the counters.
 pub const COUNTERS: &[(&str, &str)] = &[
-    ("iterations", "accepted steps of the minimization; untangling is counted apart"),
+    (
+        "iterations",
+        "accepted steps of the minimization; untangling is counted apart",
+    ),
     ("factorizations", "factorizations of a Hessian, untangling included"),
-    ("evaluations", "evaluations of the energy with or without derivatives, untangling included"),
+    (
+        "evaluations",
+        "evaluations of the energy with or without derivatives, untangling included",
+    ),
     ("start_inverted", "tetrahedra of the start that were inverted or flat"),
-    ("untangling_steps", "values of the regularization that the untangling went through"),
+    (
+        "untangling_steps",
+        "values of the regularization that the untangling went through",
+    ),
     ("untangling_iterations", "Newton iterations of the untangling"),
     ("approach_iterations", "Newton iterations on another energy, where the chosen one overflows on the start"),
     ("relaxations", "relaxations of the relaxed-newton solver"),
-    ("weights", "weights that the relaxed-newton solver minimized with, one after the other"),
-    ("shifts", "iterations of the locally-injective solver in which the Hessian was shifted"),
+    (
+        "weights",
+        "weights that the relaxed-newton solver minimized with, one after the other",
+    ),
+    (
+        "shifts",
+        "iterations of the locally-injective solver in which the Hessian was shifted",
+    ),
 ];
 
 /// Counters by name, each at 0 from the start.

@@ -31,9 +31,15 @@ fn fields(parameters: &'static [Parameter]) -> &'static [Field] {
     let field = |parameter: &'static Parameter| Field {
         name: parameter.name,
         kind: if parameter.whole {
-            Kind::Integer { min: parameter.min as i64, max: parameter.max as i64 }
+            Kind::Integer {
+                min: parameter.min as i64,
+                max: parameter.max as i64,
+            }
         } else {
-            Kind::Number { min: parameter.min, max: parameter.max }
+            Kind::Number {
+                min: parameter.min,
+                max: parameter.max,
+            }
         },
         default: if parameter.whole {
             Default::Integer(parameter.default as i64)
@@ -56,7 +62,11 @@ static KIND: LazyLock<ModelKind> = LazyLock::new(|| {
         .collect();
     let shapes = target::shapes()
         .iter()
-        .map(|shape| Generator { name: shape.name, parameters: fields(shape.parameters), doc: shape.doc })
+        .map(|shape| Generator {
+            name: shape.name,
+            parameters: fields(shape.parameters),
+            doc: shape.doc,
+        })
         .collect();
     ModelKind {
         roles: keep(vec![

@@ -105,7 +105,12 @@ impl MapObjective {
 
     /// The coordinates of the free vertices.
     pub fn unknowns(&self, positions: &[[f64; 3]]) -> Vec<f64> {
-        self.cholesky.pattern().vertices().iter().flat_map(|&vertex| positions[vertex as usize]).collect()
+        self.cholesky
+            .pattern()
+            .vertices()
+            .iter()
+            .flat_map(|&vertex| positions[vertex as usize])
+            .collect()
     }
 
     /// The positions of all vertices.
@@ -150,7 +155,9 @@ impl MapObjective {
         if let Some(pull) = &self.pull {
             for &vertex in &self.boundary {
                 let free = self.cholesky.pattern().free_index()[vertex as usize] as usize;
-                self.cholesky.pattern().add_to_diagonal(&mut self.matrix, free, 2.0 * pull.weight);
+                self.cholesky
+                    .pattern()
+                    .add_to_diagonal(&mut self.matrix, free, 2.0 * pull.weight);
             }
         }
         self.finish_gradient(distortion, gradient)
@@ -212,7 +219,9 @@ impl MapObjective {
             .iter()
             .map(|&vertex| {
                 let there = pull.targets[vertex as usize];
-                (0..3).map(|axis| (self.positions[3 * vertex as usize + axis] - there[axis]).powi(2)).sum::<f64>()
+                (0..3)
+                    .map(|axis| (self.positions[3 * vertex as usize + axis] - there[axis]).powi(2))
+                    .sum::<f64>()
             })
             .sum()
     }
@@ -224,7 +233,12 @@ impl MapObjective {
     fn evaluation(&mut self, distortion: f64) -> Evaluation {
         self.mapping.determinants(&self.positions, &mut self.determinants);
         let min_determinant = self.determinants.iter().copied().fold(f64::INFINITY, f64::min);
-        Evaluation { distortion, positional: self.squared_distances(), weight: self.weight(), min_determinant }
+        Evaluation {
+            distortion,
+            positional: self.squared_distances(),
+            weight: self.weight(),
+            min_determinant,
+        }
     }
 
     /// Adds the springs to the rows of the gradient and gathers those of the free vertices; returns the value.
@@ -238,7 +252,13 @@ impl MapObjective {
                 }
             }
         }
-        for (&vertex, gradient) in self.cholesky.pattern().vertices().iter().zip(gradient.chunks_exact_mut(3)) {
+        for (&vertex, gradient) in self
+            .cholesky
+            .pattern()
+            .vertices()
+            .iter()
+            .zip(gradient.chunks_exact_mut(3))
+        {
             gradient.copy_from_slice(&self.rows[3 * vertex as usize..3 * vertex as usize + 3]);
         }
         let evaluation = self.evaluation(distortion);

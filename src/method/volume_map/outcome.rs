@@ -33,7 +33,12 @@ pub fn measure(problem: &Problem, settings: &Settings, positions: &[[f64; 3]]) -
     // The source at the target's volume, 1: the scale at which energies and determinants compare.
     let scale = problem.source_volume().cbrt().recip();
     let rest = TetrahedralMesh {
-        points: problem.source.points.iter().map(|point| point.map(|coordinate| coordinate * scale)).collect(),
+        points: problem
+            .source
+            .points
+            .iter()
+            .map(|point| point.map(|coordinate| coordinate * scale))
+            .collect(),
         cells: problem.source.cells.clone(),
     };
     let weights = problem.volume_weights();
@@ -60,10 +65,20 @@ pub fn measure(problem: &Problem, settings: &Settings, positions: &[[f64; 3]]) -
 
     // The chosen energy as it was minimized: on the problem's source, with the problem's weights.
     let densities = densities(problem, density, positions);
-    let mean = |weights: &[f64]| weights.iter().zip(&densities).map(|(weight, value)| weight * value).sum::<f64>();
+    let mean = |weights: &[f64]| {
+        weights
+            .iter()
+            .zip(&densities)
+            .map(|(weight, value)| weight * value)
+            .sum::<f64>()
+    };
     let minimized = match settings.weighting {
         Weighting::Target => {
-            let weighted: Vec<f64> = weights.iter().zip(&determinants).map(|(weight, det)| weight * det).collect();
+            let weighted: Vec<f64> = weights
+                .iter()
+                .zip(&determinants)
+                .map(|(weight, det)| weight * det)
+                .collect();
             mean(&weighted) / weighted.iter().sum::<f64>()
         }
         weighting => mean(&problem.weights(weighting)),
@@ -81,14 +96,24 @@ pub fn measure(problem: &Problem, settings: &Settings, positions: &[[f64; 3]]) -
             ratio + 1.0 / ratio
         })
         .collect();
-    let average = |values: &[f64]| weights.iter().zip(values).map(|(weight, value)| weight * value).sum::<f64>();
+    let average = |values: &[f64]| {
+        weights
+            .iter()
+            .zip(values)
+            .map(|(weight, value)| weight * value)
+            .sum::<f64>()
+    };
     let largest = |values: &[f64]| values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     set("d_aa", average(&ratios));
     set("d_ma", largest(&ratios));
-    let inverted: Vec<u32> =
-        (0..cells as u32).filter(|&cell| !(determinants[cell as usize] > 0.0)).collect();
+    let inverted: Vec<u32> = (0..cells as u32)
+        .filter(|&cell| !(determinants[cell as usize] > 0.0))
+        .collect();
     let volume_distortions = |factor: f64| -> Vec<f64> {
-        determinants.iter().map(|&determinant| factor * determinant + 1.0 / (factor * determinant)).collect()
+        determinants
+            .iter()
+            .map(|&determinant| factor * determinant + 1.0 / (factor * determinant))
+            .collect()
     };
     let (as_given, rescaled) = (volume_distortions(stretch.powi(3)), volume_distortions(1.0));
     let defined = |value: f64| if inverted.is_empty() { value } else { f64::NAN };
@@ -97,45 +122,88 @@ pub fn measure(problem: &Problem, settings: &Settings, positions: &[[f64; 3]]) -
     set("d_av_rescaled", defined(average(&rescaled)));
     set("d_mv_rescaled", defined(largest(&rescaled)));
 
-    set("inverted", determinants.iter().filter(|&&determinant| determinant < 0.0).count() as f64);
+    set(
+        "inverted",
+        determinants.iter().filter(|&&determinant| determinant < 0.0).count() as f64,
+    );
     let degenerate = rest.cells.iter().zip(&determinants).filter(|&(&cell, &determinant)| {
         let edges = |points: &[[f64; 3]]| {
             let [a, b, c, d] = cell.map(|vertex| points[vertex as usize]);
-            [b, c, d].iter().map(|&point| mesh::length(mesh::subtract(point, a))).product::<f64>()
+            [b, c, d]
+                .iter()
+                .map(|&point| mesh::length(mesh::subtract(point, a)))
+                .product::<f64>()
         };
         determinant.abs() <= FLAT * edges(positions) / edges(&rest.points)
     });
     set("degenerate", degenerate.count() as f64);
     set("inverted_lower_bound", problem.obstacles.lower_bound as f64);
-    set("min_determinant", determinants.iter().copied().fold(f64::INFINITY, f64::min));
+    set(
+        "min_determinant",
+        determinants.iter().copied().fold(f64::INFINITY, f64::min),
+    );
 
-    let image = TetrahedralMesh { points: given.clone(), cells: rest.cells.clone() };
-    let jacobians: Vec<f64> = image.cells.iter().map(|&cell| scaled_jacobian(image.corners(cell))).collect();
-    set("scaled_jacobian_min", jacobians.iter().copied().fold(f64::INFINITY, f64::min));
+    let image = TetrahedralMesh {
+        points: given.clone(),
+        cells: rest.cells.clone(),
+    };
+    let jacobians: Vec<f64> = image
+        .cells
+        .iter()
+        .map(|&cell| scaled_jacobian(image.corners(cell)))
+        .collect();
+    set(
+        "scaled_jacobian_min",
+        jacobians.iter().copied().fold(f64::INFINITY, f64::min),
+    );
     set("scaled_jacobian_mean", jacobians.iter().sum::<f64>() / cells as f64);
 
     let distances: Vec<f64> = problem
         .boundary
         .vertices
         .iter()
-        .map(|&vertex| mesh::length(mesh::subtract(given[vertex as usize], problem.given_targets[vertex as usize])))
+        .map(|&vertex| {
+            mesh::length(mesh::subtract(
+                given[vertex as usize],
+                problem.given_targets[vertex as usize],
+            ))
+        })
         .collect();
-    set("constraint_residual", distances.iter().map(|distance| distance * distance).sum::<f64>() / problem.unit.powi(2));
-    let on_target: Vec<[f64; 3]> =
-        problem.boundary.vertices.iter().map(|&vertex| problem.given_targets[vertex as usize]).collect();
-    set("constraint_distance", distances.iter().copied().fold(0.0, f64::max) / mesh::diagonal(&on_target));
+    set(
+        "constraint_residual",
+        distances.iter().map(|distance| distance * distance).sum::<f64>() / problem.unit.powi(2),
+    );
+    let on_target: Vec<[f64; 3]> = problem
+        .boundary
+        .vertices
+        .iter()
+        .map(|&vertex| problem.given_targets[vertex as usize])
+        .collect();
+    set(
+        "constraint_distance",
+        distances.iter().copied().fold(0.0, f64::max) / mesh::diagonal(&on_target),
+    );
 
     let enclosed = enclosed_volume(&problem.boundary, positions);
-    set("mean_determinant_error", (average(&determinants) / enclosed - 1.0).abs());
+    set(
+        "mean_determinant_error",
+        (average(&determinants) / enclosed - 1.0).abs(),
+    );
     set("volume_ratio", problem.ratio);
     set("vertices", rest.points.len() as f64);
     set("tetrahedra", cells as f64);
     set("boundary_vertices", problem.boundary.vertices.len() as f64);
 
-    let flags: Vec<f64> = determinants.iter().map(|&determinant| if determinant > 0.0 { 0.0 } else { 1.0 }).collect();
+    let flags: Vec<f64> = determinants
+        .iter()
+        .map(|&determinant| if determinant > 0.0 { 0.0 } else { 1.0 })
+        .collect();
     let mesh = vtu::write(
         &given,
-        Cells { tetrahedra: &image.cells, ..Cells::default() },
+        Cells {
+            tetrahedra: &image.cells,
+            ..Cells::default()
+        },
         &[("source", 3, problem.given.as_flattened())],
         &[
             ("angle_distortion", 1, &ratios),
@@ -146,12 +214,20 @@ pub fn measure(problem: &Problem, settings: &Settings, positions: &[[f64; 3]]) -
             ("inverted", 1, &flags),
         ],
     );
-    Ok(Measured { metrics, mesh, inverted })
+    Ok(Measured {
+        metrics,
+        mesh,
+        inverted,
+    })
 }
 
 /// The volume within the image of the boundary.
 fn enclosed_volume(boundary: &Boundary, positions: &[[f64; 3]]) -> f64 {
-    TriangleMesh { points: positions.to_vec(), cells: boundary.triangles.clone() }.enclosed_volume()
+    TriangleMesh {
+        points: positions.to_vec(),
+        cells: boundary.triangles.clone(),
+    }
+    .enclosed_volume()
 }
 
 /// The energy density in every tetrahedron of the problem's source.

@@ -40,7 +40,10 @@ pub struct Problem {
 }
 
 fn invalid(reason: String) -> Failure {
-    Failure { kind: "invalid-input".to_string(), reason }
+    Failure {
+        kind: "invalid-input".to_string(),
+        reason,
+    }
 }
 
 impl Problem {
@@ -50,7 +53,10 @@ impl Problem {
     /// `invalid-input` for a mesh or target that cannot be used.
     pub fn new(model: &LoadedModel, settings: &Settings) -> Result<Problem, Failure> {
         let part = |role: &str| {
-            model.parts.get(role).ok_or_else(|| invalid(format!("the model has no `{role}`; give it a file or a generator")))
+            model
+                .parts
+                .get(role)
+                .ok_or_else(|| invalid(format!("the model has no `{role}`; give it a file or a generator")))
         };
         let mut notices = Vec::new();
         let (mut source, natural) = read_source(part("mesh")?, &mut notices)?;
@@ -82,8 +88,11 @@ impl Problem {
             positions[vertex as usize] = position;
         }
         let mut interior = target.interior;
-        let enclosed =
-            TriangleMesh { points: positions.clone(), cells: boundary.triangles.clone() }.enclosed_volume();
+        let enclosed = TriangleMesh {
+            points: positions.clone(),
+            cells: boundary.triangles.clone(),
+        }
+        .enclosed_volume();
         let volume = source.volume();
         let size = mesh::diagonal(&target.positions);
         if !(enclosed.abs() > 1e-12 * size.powi(3)) {
@@ -138,16 +147,26 @@ impl Problem {
         let obstacles = feasibility::check(&source, &boundary, &positions);
 
         let unit = enclosed.cbrt();
-        let scale = if settings.rescale { volume.cbrt().recip() } else { unit.recip() };
+        let scale = if settings.rescale {
+            volume.cbrt().recip()
+        } else {
+            unit.recip()
+        };
         let scaled = |points: &[[f64; 3]], factor: f64| -> Vec<[f64; 3]> {
-            points.iter().map(|point| point.map(|coordinate| coordinate * factor)).collect()
+            points
+                .iter()
+                .map(|point| point.map(|coordinate| coordinate * factor))
+                .collect()
         };
         Ok(Problem {
             targets: scaled(&positions, unit.recip()),
             interior: interior.map(|points| scaled(&points, unit.recip())),
             given: source.points.clone(),
             given_targets: positions,
-            source: TetrahedralMesh { points: scaled(&source.points, scale), cells: source.cells },
+            source: TetrahedralMesh {
+                points: scaled(&source.points, scale),
+                cells: source.cells,
+            },
             boundary,
             unit,
             ratio: enclosed / volume,
@@ -194,8 +213,10 @@ impl Problem {
 
     /// Positions in the units of the target's file; boundary vertices on their targets stand there to the last bit.
     pub fn to_given_units(&self, positions: &[[f64; 3]]) -> Vec<[f64; 3]> {
-        let mut given: Vec<[f64; 3]> =
-            positions.iter().map(|point| point.map(|coordinate| coordinate * self.unit)).collect();
+        let mut given: Vec<[f64; 3]> = positions
+            .iter()
+            .map(|point| point.map(|coordinate| coordinate * self.unit))
+            .collect();
         for &vertex in &self.boundary.vertices {
             if positions[vertex as usize] == self.targets[vertex as usize] {
                 given[vertex as usize] = self.given_targets[vertex as usize];
@@ -217,7 +238,11 @@ fn read_source(part: &Part, notices: &mut Vec<String>) -> Result<(TetrahedralMes
                 .map_err(|reason| invalid(format!("generator \"{generator}\" of the mesh: {reason}")))?;
             Ok((generated.mesh, generated.natural))
         }
-        Part::File { name, bytes, parameters } => {
+        Part::File {
+            name,
+            bytes,
+            parameters,
+        } => {
             let mut mesh = read_tetrahedra(name, bytes, notices)?;
             let scale = scale_of(parameters);
             for point in &mut mesh.points {
@@ -239,9 +264,14 @@ fn read_tetrahedra(name: &str, bytes: &[u8], notices: &mut Vec<String>) -> Resul
         )));
     }
     if content.tetrahedra.is_empty() {
-        return Err(invalid(format!("{name}: the mesh has no tetrahedra; a map needs a volume mesh")));
+        return Err(invalid(format!(
+            "{name}: the mesh has no tetrahedra; a map needs a volume mesh"
+        )));
     }
-    Ok(TetrahedralMesh { points: content.points, cells: content.tetrahedra })
+    Ok(TetrahedralMesh {
+        points: content.points,
+        cells: content.tetrahedra,
+    })
 }
 
 fn read_target(
@@ -254,7 +284,11 @@ fn read_target(
     match part {
         Part::Generated { generator, parameters } => target::shape(generator, parameters, source, boundary, natural)
             .map_err(|reason| invalid(format!("shape \"{generator}\" of the target: {reason}"))),
-        Part::File { name, bytes, parameters } => {
+        Part::File {
+            name,
+            bytes,
+            parameters,
+        } => {
             let scale = scale_of(parameters);
             if Format::of_content(bytes).or(Format::of_name(name)).is_none() {
                 let text = std::str::from_utf8(bytes).map_err(|error| {
@@ -264,7 +298,8 @@ fn read_target(
                         error.valid_up_to()
                     ))
                 })?;
-                return target::list::parse(text, boundary, scale).map_err(|reason| invalid(format!("{name}: {reason}")));
+                return target::list::parse(text, boundary, scale)
+                    .map_err(|reason| invalid(format!("{name}: {reason}")));
             }
             let mut mesh = read_tetrahedra(name, bytes, notices)?;
             for point in &mut mesh.points {

@@ -33,6 +33,10 @@ pub fn minimize(
         ..Newton::default()
     };
     let x = objective.unknowns(start);
-    let mut recorder = Recorder { latest: objective.latest(), observer, trace };
+    let mut recorder = Recorder {
+        latest: objective.latest(),
+        observer,
+        trace,
+    };
     newton.minimize(objective, x, &mut recorder)
 }

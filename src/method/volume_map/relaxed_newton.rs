@@ -32,7 +32,11 @@ pub struct Relaxed {
 
 /// What one try for a step gave.
 enum Update {
-    Accepted { length: f64, decrease: f64, gradient_norm: f64 },
+    Accepted {
+        length: f64,
+        decrease: f64,
+        gradient_norm: f64,
+    },
     Refused,
     NotFinite,
 }
@@ -86,7 +90,10 @@ pub fn minimize(
         weights.push(options.weight);
         (stop, reason) = run.at_weight(problem, settings, options.weight);
         let missed = run.objective.positional(&run.x) > options.constraint_tolerance;
-        let give_up = matches!(stop, StopReason::TimeLimit | StopReason::Cancelled | StopReason::StepLimit);
+        let give_up = matches!(
+            stop,
+            StopReason::TimeLimit | StopReason::Cancelled | StopReason::StepLimit
+        );
         if options.continuation == Continuation::Auto && missed && !give_up {
             // The fixed weight was too stiff to find a way: once more from the start, with a growing one.
             run.x = x;
@@ -143,7 +150,10 @@ impl Run<'_> {
         let mut decrease = f64::INFINITY;
         loop {
             if !value.is_finite() || !gradient_norm.is_finite() {
-                return (StopReason::NotFinite, "the energy or its gradient is not a finite number".to_string());
+                return (
+                    StopReason::NotFinite,
+                    "the energy or its gradient is not a finite number".to_string(),
+                );
             }
             self.tell(value, gradient_norm, step);
             let balanced = self.objective.balanced_norm(&self.gradient);
@@ -163,7 +173,10 @@ impl Run<'_> {
                 return (stop, "stopped from outside".to_string());
             }
             if self.iterations >= settings.iterations {
-                return (StopReason::StepLimit, format!("{} iterations were not enough", settings.iterations));
+                return (
+                    StopReason::StepLimit,
+                    format!("{} iterations were not enough", settings.iterations),
+                );
             }
             let mut update = self.update(self.options.gradient_criterion);
             if matches!(update, Update::Refused) && self.options.relaxation {
@@ -174,7 +187,11 @@ impl Run<'_> {
                 update = self.update(false);
             }
             match update {
-                Update::Accepted { length, decrease: lower, gradient_norm: norm } => {
+                Update::Accepted {
+                    length,
+                    decrease: lower,
+                    gradient_norm: norm,
+                } => {
                     step = length;
                     decrease = lower;
                     value = self.objective.value(&self.x);
@@ -182,10 +199,16 @@ impl Run<'_> {
                     self.iterations += 1;
                 }
                 Update::Refused => {
-                    return (StopReason::Stalled, format!("no step is acceptable at weight {weight:.3e}"));
+                    return (
+                        StopReason::Stalled,
+                        format!("no step is acceptable at weight {weight:.3e}"),
+                    );
                 }
                 Update::NotFinite => {
-                    return (StopReason::NotFinite, "a derivative of the energy is not a finite number".to_string());
+                    return (
+                        StopReason::NotFinite,
+                        "a derivative of the energy is not a finite number".to_string(),
+                    );
                 }
             }
         }
@@ -194,11 +217,23 @@ impl Run<'_> {
     /// One Newton step with backtracking, if one is acceptable.
     fn update(&mut self, gradient_criterion: bool) -> Update {
         self.evaluations += 1;
-        let Ok(value) = self.objective.newton_direction(&self.x, &mut self.gradient, &mut self.direction) else {
+        let Ok(value) = self
+            .objective
+            .newton_direction(&self.x, &mut self.gradient, &mut self.direction)
+        else {
             return Update::NotFinite;
         };
-        let search = Backtracking { gradient_decrease: gradient_criterion, trials: 20, ..Backtracking::default() };
-        let start = Start { x: &self.x, value, gradient: &self.gradient, direction: &self.direction };
+        let search = Backtracking {
+            gradient_decrease: gradient_criterion,
+            trials: 20,
+            ..Backtracking::default()
+        };
+        let start = Start {
+            x: &self.x,
+            value,
+            gradient: &self.gradient,
+            direction: &self.direction,
+        };
         let accepted = search.search(
             &mut *self.objective,
             start,
@@ -206,7 +241,9 @@ impl Run<'_> {
             &mut self.ahead,
             &mut self.evaluations,
         );
-        let Some(accepted) = accepted else { return Update::Refused };
+        let Some(accepted) = accepted else {
+            return Update::Refused;
+        };
         if !accepted.has_gradient {
             self.evaluations += 1;
             self.objective.gradient(&self.point, &mut self.ahead);
@@ -224,7 +261,10 @@ impl Run<'_> {
     fn relax(&mut self, problem: &Problem, weight: f64) {
         self.relaxations += 1;
         let present = self.objective.positions(&self.x);
-        self.objective.set_pull(Some(Pull { weight, targets: present }));
+        self.objective.set_pull(Some(Pull {
+            weight,
+            targets: present,
+        }));
         for _ in 0..self.options.relaxation_steps {
             match self.update(false) {
                 // Less than this moves nothing that matters to the next step.
@@ -232,11 +272,19 @@ impl Run<'_> {
                 _ => break,
             }
         }
-        self.objective.set_pull(Some(Pull { weight, targets: problem.targets.clone() }));
+        self.objective.set_pull(Some(Pull {
+            weight,
+            targets: problem.targets.clone(),
+        }));
     }
 
     fn tell(&mut self, energy: f64, gradient_norm: f64, step: f64) {
-        let iterate = Iterate { iteration: self.iterations, energy, gradient_norm, step };
+        let iterate = Iterate {
+            iteration: self.iterations,
+            energy,
+            gradient_norm,
+            step,
+        };
         let evaluation = self.objective.describe(&self.x);
         self.trace.record(&iterate, &evaluation);
         self.observer.iterate(&iterate);

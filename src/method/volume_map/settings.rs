@@ -15,7 +15,10 @@ pub static FIELDS: &[Field] = &[
         name: "preset",
         kind: Kind::Choice(&[
             ("best", "hard constraints, harmonic start, untangling, projected Newton"),
-            ("paper", "soft constraints, similarity start, relaxation-enhanced Newton, source not rescaled"),
+            (
+                "paper",
+                "soft constraints, similarity start, relaxation-enhanced Newton, source not rescaled",
+            ),
         ]),
         default: Default::Text("best"),
         doc: "Chooses every setting that the file leaves open. A setting in the file wins over the preset.",
@@ -29,8 +32,14 @@ pub static FIELDS: &[Field] = &[
     Field {
         name: "weighting",
         kind: Kind::Choice(&[
-            ("volume", "each tetrahedron by its source volume; an affine boundary then gives an affine map"),
-            ("uniform", "each tetrahedron alike, as equation 8 of the paper is printed"),
+            (
+                "volume",
+                "each tetrahedron by its source volume; an affine boundary then gives an affine map",
+            ),
+            (
+                "uniform",
+                "each tetrahedron alike, as equation 8 of the paper is printed",
+            ),
             ("target", "each tetrahedron by its volume in the image"),
         ]),
         default: Default::Text("volume"),
@@ -39,9 +48,18 @@ pub static FIELDS: &[Field] = &[
     Field {
         name: "barrier",
         kind: Kind::Choice(&[
-            ("auto", "the locally injective barrier for energies that do not blow up at zero volume"),
-            ("none", "the energy alone; without a barrier of its own it may fold tetrahedra over"),
-            ("locally-injective", "the barrier of Schueller et al. 2013 added to any energy"),
+            (
+                "auto",
+                "the locally injective barrier for energies that do not blow up at zero volume",
+            ),
+            (
+                "none",
+                "the energy alone; without a barrier of its own it may fold tetrahedra over",
+            ),
+            (
+                "locally-injective",
+                "the barrier of Schueller et al. 2013 added to any energy",
+            ),
         ]),
         default: Default::Text("auto"),
         doc: "An additional term against inverted tetrahedra.",
@@ -71,10 +89,22 @@ pub static FIELDS: &[Field] = &[
     Field {
         name: "solver",
         kind: Kind::Choice(&[
-            ("projected-newton", "hard constraints, Newton with a positive Hessian and flip-free steps"),
-            ("relaxed-newton", "the paper's: soft constraints, energy-and-gradient line search, relaxation"),
-            ("locally-injective", "Schueller et al. 2013: soft constraints that advance in substeps, barrier"),
-            ("l-bfgs", "hard constraints, limited-memory quasi-Newton with flip-free steps"),
+            (
+                "projected-newton",
+                "hard constraints, Newton with a positive Hessian and flip-free steps",
+            ),
+            (
+                "relaxed-newton",
+                "the paper's: soft constraints, energy-and-gradient line search, relaxation",
+            ),
+            (
+                "locally-injective",
+                "Schueller et al. 2013: soft constraints that advance in substeps, barrier",
+            ),
+            (
+                "l-bfgs",
+                "hard constraints, limited-memory quasi-Newton with flip-free steps",
+            ),
         ]),
         default: Default::Absent,
         doc: "The minimizer. Preset best: projected-newton, paper: relaxed-newton.",
@@ -82,10 +112,16 @@ pub static FIELDS: &[Field] = &[
     Field {
         name: "start",
         kind: Kind::Choice(&[
-            ("auto", "harmonic for the solvers with hard constraints, similarity for those with soft ones"),
+            (
+                "auto",
+                "harmonic for the solvers with hard constraints, similarity for those with soft ones",
+            ),
             ("harmonic", "the minimizer of the Dirichlet energy"),
             ("rest", "the source as it is"),
-            ("similarity", "the source turned, scaled and moved onto the target's boundary"),
+            (
+                "similarity",
+                "the source turned, scaled and moved onto the target's boundary",
+            ),
             ("target-mesh", "the positions of the target's mesh, interior included"),
             ("random-interior", "interior vertices at random in the target's box"),
         ]),
@@ -96,8 +132,14 @@ pub static FIELDS: &[Field] = &[
     Field {
         name: "similarity",
         kind: Kind::Choice(&[
-            ("closed-form", "least squares over rotation, scale and translation (Umeyama 1991)"),
-            ("thirteen-variables", "the paper's fit of a matrix, a translation and a scale, then the nearest rotation"),
+            (
+                "closed-form",
+                "least squares over rotation, scale and translation (Umeyama 1991)",
+            ),
+            (
+                "thirteen-variables",
+                "the paper's fit of a matrix, a translation and a scale, then the nearest rotation",
+            ),
         ]),
         default: Default::Absent,
         doc: "How the similarity start is fitted. Preset best: closed-form, paper: thirteen-variables.",
@@ -112,8 +154,14 @@ pub static FIELDS: &[Field] = &[
         name: "split",
         kind: Kind::Choice(&[
             ("none", "the mesh as it is"),
-            ("needed", "interior edges within one planar target face, and tetrahedra that the boundary inverts"),
-            ("all", "every interior edge between boundary vertices, then every tetrahedron with four of them"),
+            (
+                "needed",
+                "interior edges within one planar target face, and tetrahedra that the boundary inverts",
+            ),
+            (
+                "all",
+                "every interior edge between boundary vertices, then every tetrahedron with four of them",
+            ),
         ]),
         default: Default::Absent,
         doc: "What to split where the connectivity leaves no room for a map without inversions. Preset best: needed, \
@@ -205,8 +253,14 @@ pub static FIELDS: &[Field] = &[
                 name: "continuation",
                 kind: Kind::Choice(&[
                     ("off", "the weight is fixed"),
-                    ("on", "the weight starts small and is raised whenever the solver converges off the target"),
-                    ("auto", "first a fixed weight; continuation from the start again if that misses the target"),
+                    (
+                        "on",
+                        "the weight starts small and is raised whenever the solver converges off the target",
+                    ),
+                    (
+                        "auto",
+                        "first a fixed weight; continuation from the start again if that misses the target",
+                    ),
                 ]),
                 default: Default::Text("auto"),
                 doc: "Raising the weight step by step, for acute constraints.",
@@ -301,7 +355,10 @@ pub static FIELDS: &[Field] = &[
             Field {
                 name: "rest_shape",
                 kind: Kind::Choice(&[
-                    ("locally-scaled", "each source tetrahedron scaled as the boundary near it is stretched"),
+                    (
+                        "locally-scaled",
+                        "each source tetrahedron scaled as the boundary near it is stretched",
+                    ),
                     ("uniform", "the source scaled as a whole"),
                 ]),
                 default: Default::Text("locally-scaled"),
@@ -343,7 +400,10 @@ const HESSIANS: &[(&str, &str)] = &[
 ];
 
 fn energy_names() -> Vec<(&'static str, String)> {
-    energy::energies().iter().map(|energy| (energy.name(), energy.formula().to_string())).collect()
+    energy::energies()
+        .iter()
+        .map(|energy| (energy.name(), energy.formula().to_string()))
+        .collect()
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -551,14 +611,22 @@ impl Settings {
 
     /// The energy of this name, or a failure that lists the known ones.
     pub fn density(&self) -> Result<&'static dyn energy::Energy, Failure> {
-        energy::energies().iter().copied().find(|energy| energy.name() == self.energy).ok_or_else(|| Failure {
-            kind: "invalid-input".to_string(),
-            reason: format!(
-                "unknown energy \"{}\"; known are {}",
-                self.energy,
-                energy::energies().iter().map(|energy| energy.name()).collect::<Vec<_>>().join(", ")
-            ),
-        })
+        energy::energies()
+            .iter()
+            .copied()
+            .find(|energy| energy.name() == self.energy)
+            .ok_or_else(|| Failure {
+                kind: "invalid-input".to_string(),
+                reason: format!(
+                    "unknown energy \"{}\"; known are {}",
+                    self.energy,
+                    energy::energies()
+                        .iter()
+                        .map(|energy| energy.name())
+                        .collect::<Vec<_>>()
+                        .join(", ")
+                ),
+            })
     }
 
     /// Whether the barrier term is added to this energy.
@@ -617,8 +685,15 @@ impl Settings {
             drop(&["energy_tolerance", "change_tolerance"]);
         }
         // Written with the words they stand for, so that `auto` and its meaning share a key.
-        let barrier = if self.with_barrier() { Barrier::LocallyInjective } else { Barrier::None };
-        for (name, value) in [("barrier", serde_json::to_value(barrier)), ("start", serde_json::to_value(start))] {
+        let barrier = if self.with_barrier() {
+            Barrier::LocallyInjective
+        } else {
+            Barrier::None
+        };
+        for (name, value) in [
+            ("barrier", serde_json::to_value(barrier)),
+            ("start", serde_json::to_value(start)),
+        ] {
             if let Ok(value) = value {
                 table.insert(name.to_string(), value);
             }
@@ -661,7 +736,10 @@ pub fn check(settings: &Value) -> Vec<(String, String)> {
     let mut errors = Vec::new();
     let mut error = |path: &str, message: &str| errors.push((path.to_string(), message.to_string()));
     if settings.solver == Solver::LocallyInjective && settings.barrier == Barrier::None {
-        error("barrier", "the locally-injective solver rests on the barrier; use \"auto\" or another solver");
+        error(
+            "barrier",
+            "the locally-injective solver rests on the barrier; use \"auto\" or another solver",
+        );
     }
     errors
 }

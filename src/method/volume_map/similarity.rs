@@ -42,7 +42,12 @@ fn moments(from: &[[f64; 3]], to: &[[f64; 3]]) -> Moments {
         from_from += x * x.transpose();
         to_from += y * x.transpose();
     }
-    Moments { from_mean, to_mean, from_from, to_from }
+    Moments {
+        from_mean,
+        to_mean,
+        from_from,
+        to_from,
+    }
 }
 
 /// The rotation `U V^T` nearest to `matrix`, its last column negated where the determinant asks for it, and the sum of
@@ -57,7 +62,10 @@ fn nearest_rotation(matrix: &Matrix3<f64>) -> (Matrix3<f64>, f64) {
         let smallest = svd.singular_values.imin();
         signs[smallest] = -1.0;
     }
-    (u * Matrix3::from_diagonal(&signs) * v_t, svd.singular_values.dot(&signs))
+    (
+        u * Matrix3::from_diagonal(&signs) * v_t,
+        svd.singular_values.dot(&signs),
+    )
 }
 
 /// Least squares over all similarities: `min sum |s R x + t - y|^2` (Umeyama 1991).
@@ -67,7 +75,11 @@ pub fn closed_form(from: &[[f64; 3]], to: &[[f64; 3]]) -> Similarity {
     let spread = moments.from_from.trace();
     let scale = if spread > 0.0 { trace / spread } else { 1.0 };
     let translation = moments.to_mean - scale * (rotation * moments.from_mean);
-    Similarity { scale, rotation, translation }
+    Similarity {
+        scale,
+        rotation,
+        translation,
+    }
 }
 
 /// The paper's fit: `min sum |Q x + t - y|^2 + |Q^T Q - s^2 I|^2` over matrix, translation and scale, then the
@@ -99,8 +111,7 @@ pub fn thirteen_variables(from: &[[f64; 3]], to: &[[f64; 3]]) -> Similarity {
         for column in 0..9 {
             let mut d = Matrix3::zeros();
             d[column] = 1.0;
-            let change = 2.0 * d * a
-                + 4.0 * (d * gram + q * d.transpose() * q + q * q.transpose() * d)
+            let change = 2.0 * d * a + 4.0 * (d * gram + q * d.transpose() * q + q * q.transpose() * d)
                 - 4.0 / 3.0 * (2.0 * q.dot(&d) * q + gram.trace() * d);
             hessian.column_mut(column).copy_from_slice(change.as_slice());
         }
@@ -138,5 +149,9 @@ pub fn thirteen_variables(from: &[[f64; 3]], to: &[[f64; 3]]) -> Similarity {
     }
     let (rotation, _) = nearest_rotation(&q);
     let translation = moments.to_mean - q * moments.from_mean;
-    Similarity { scale: ((q.transpose() * q).trace() / 3.0).sqrt(), rotation, translation }
+    Similarity {
+        scale: ((q.transpose() * q).trace() / 3.0).sqrt(),
+        rotation,
+        translation,
+    }
 }

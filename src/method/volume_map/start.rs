@@ -17,14 +17,24 @@ pub fn positions(problem: &Problem, settings: &Settings) -> Result<Vec<[f64; 3]>
         Start::Rest => problem.source.points.clone(),
         Start::Similarity => {
             let on_boundary = |points: &[[f64; 3]]| -> Vec<[f64; 3]> {
-                problem.boundary.vertices.iter().map(|&vertex| points[vertex as usize]).collect()
+                problem
+                    .boundary
+                    .vertices
+                    .iter()
+                    .map(|&vertex| points[vertex as usize])
+                    .collect()
             };
             let (from, to) = (on_boundary(&problem.source.points), on_boundary(&problem.targets));
             let similarity = match settings.similarity {
                 SimilarityFit::ClosedForm => similarity::closed_form(&from, &to),
                 SimilarityFit::ThirteenVariables => similarity::thirteen_variables(&from, &to),
             };
-            problem.source.points.iter().map(|&point| similarity.apply(point)).collect()
+            problem
+                .source
+                .points
+                .iter()
+                .map(|&point| similarity.apply(point))
+                .collect()
         }
         Start::TargetMesh => problem.interior.clone().ok_or_else(|| Failure {
             kind: "invalid-input".to_string(),
@@ -34,8 +44,12 @@ pub fn positions(problem: &Problem, settings: &Settings) -> Result<Vec<[f64; 3]>
         })?,
         Start::RandomInterior => {
             let mut positions = problem.targets.clone();
-            let inside: Vec<[f64; 3]> =
-                problem.boundary.vertices.iter().map(|&vertex| problem.targets[vertex as usize]).collect();
+            let inside: Vec<[f64; 3]> = problem
+                .boundary
+                .vertices
+                .iter()
+                .map(|&vertex| problem.targets[vertex as usize])
+                .collect();
             if let Some([low, high]) = mesh::bounding_box(&inside) {
                 let mut random = SplitMix(settings.seed);
                 for (vertex, position) in positions.iter_mut().enumerate() {

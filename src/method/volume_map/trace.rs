@@ -9,13 +9,28 @@ use std::rc::Rc;
 /// Names and meanings of the columns.
 pub const COLUMNS: &[(&str, &str)] = &[
     ("iteration", "number of accepted steps before this row"),
-    ("energy", "what the solver minimizes: distortion, barrier and pull of the constraints together"),
-    ("distortion", "the part of the energy that belongs to the map: density and barrier"),
-    ("positional", "sum of squared distances of the boundary to its target, in units of the target's volume to the 2/3"),
+    (
+        "energy",
+        "what the solver minimizes: distortion, barrier and pull of the constraints together",
+    ),
+    (
+        "distortion",
+        "the part of the energy that belongs to the map: density and barrier",
+    ),
+    (
+        "positional",
+        "sum of squared distances of the boundary to its target, in units of the target's volume to the 2/3",
+    ),
     ("weight", "weight of the positional part; 0 with hard constraints"),
     ("gradient_norm", "Euclidean norm of the gradient over the free unknowns"),
-    ("step", "length factor of the step that led here, 1 for a full Newton step"),
-    ("min_determinant", "smallest determinant of a tetrahedron, the source scaled to the target's volume"),
+    (
+        "step",
+        "length factor of the step that led here, 1 for a full Newton step",
+    ),
+    (
+        "min_determinant",
+        "smallest determinant of a tetrahedron, the source scaled to the target's volume",
+    ),
 ];
 
 /// The rows so far.

@@ -50,12 +50,26 @@ pub fn untangle(
         RestShape::Uniform => vec![problem.source_volume().cbrt().recip(); problem.source.cells.len()],
         RestShape::LocallyScaled => local_scales(problem)?,
     };
-    let mut regularization = Untangling { epsilon: 1.0, lambda: options.determinant_weight };
-    let mapping = MappingEnergy::new(&problem.source, &weights, Density::of(regularization), Some(&scales))
-        .map_err(|error| Failure { kind: "invalid-input".to_string(), reason: format!("source mesh: {error}") })?;
+    let mut regularization = Untangling {
+        epsilon: 1.0,
+        lambda: options.determinant_weight,
+    };
+    let mapping =
+        MappingEnergy::new(&problem.source, &weights, Density::of(regularization), Some(&scales)).map_err(|error| {
+            Failure {
+                kind: "invalid-input".to_string(),
+                reason: format!("source mesh: {error}"),
+            }
+        })?;
     let free: Vec<bool> = problem.boundary.mask.iter().map(|&fixed| !fixed).collect();
-    let mut objective =
-        MapObjective::new(mapping, &problem.source, &free, &problem.boundary.vertices, start, Hessian::Projected)?;
+    let mut objective = MapObjective::new(
+        mapping,
+        &problem.source,
+        &free,
+        &problem.boundary.vertices,
+        start,
+        Hessian::Projected,
+    )?;
     let mut x = objective.unknowns(start);
     let mut counters = Counters::default();
     let mut steps = 0;
@@ -70,9 +84,18 @@ pub fn untangle(
         },
         ..Newton::default()
     };
-    while steps < options.steps && objective.determinants(&x).iter().any(|&determinant| !(determinant > 0.0)) {
+    while steps < options.steps
+        && objective
+            .determinants(&x)
+            .iter()
+            .any(|&determinant| !(determinant > 0.0))
+    {
         objective.set_density(Density::of(regularization));
-        let mut watch = Watch { observer: &mut *observer, first: None, done: counters.iterations };
+        let mut watch = Watch {
+            observer: &mut *observer,
+            first: None,
+            done: counters.iterations,
+        };
         let solution = newton.minimize(&mut objective, x, &mut watch);
         let first = watch.first.unwrap_or(solution.value);
         x = solution.x;
@@ -88,7 +111,11 @@ pub fn untangle(
         let lowest = objective.determinants(&x).iter().copied().fold(f64::INFINITY, f64::min);
         let sigma = (1.0 - solution.value / first).max(options.decrease);
         let goal = (1.0 - sigma) * regularization.chi(lowest);
-        regularization.epsilon = if lowest < goal { 2.0 * (goal * (goal - lowest)).sqrt() } else { 1e-10 };
+        regularization.epsilon = if lowest < goal {
+            2.0 * (goal * (goal - lowest)).sqrt()
+        } else {
+            1e-10
+        };
         // Squares of anything smaller vanish.
         regularization.epsilon = regularization.epsilon.max(1e-100);
     }
@@ -99,7 +126,13 @@ pub fn untangle(
         .filter(|&(_, &determinant)| !(determinant > 0.0))
         .map(|(cell, _)| cell as u32)
         .collect();
-    Ok(Untangled { positions: objective.positions(&x), left, interrupted, steps, counters })
+    Ok(Untangled {
+        positions: objective.positions(&x),
+        left,
+        interrupted,
+        steps,
+        counters,
+    })
 }
 
 /// The factor of every tetrahedron at rest: how the boundary near it is stretched.
@@ -107,9 +140,8 @@ fn local_scales(problem: &Problem) -> Result<Vec<f64>, Failure> {
     let mut source = vec![0.0; problem.source.points.len()];
     let mut target = source.clone();
     for &triangle in &problem.boundary.triangles {
-        let area = |points: &[[f64; 3]]| {
-            mesh::length(mesh::area_vector(triangle.map(|vertex| points[vertex as usize]))) / 2.0
-        };
+        let area =
+            |points: &[[f64; 3]]| mesh::length(mesh::area_vector(triangle.map(|vertex| points[vertex as usize]))) / 2.0;
         let (before, after) = (area(&problem.source.points), area(&problem.targets));
         for vertex in triangle {
             source[vertex as usize] += before;
@@ -126,7 +158,13 @@ fn local_scales(problem: &Problem) -> Result<Vec<f64>, Failure> {
         .map(|(&before, &after)| {
             let ratio = after / before;
             // A vertex whose triangles all collapse has no scale of its own; it takes the smallest sensible one.
-            [0.5 * if before > 0.0 && after > 0.0 { ratio } else { 1e-12 * mean }.max(1e-12 * mean).ln()]
+            [0.5 * if before > 0.0 && after > 0.0 {
+                ratio
+            } else {
+                1e-12 * mean
+            }
+            .max(1e-12 * mean)
+            .ln()]
         })
         .collect();
     harmonic::extend_over_graph(&problem.source, &problem.boundary.mask, &mut logarithms)?;
@@ -152,7 +190,10 @@ impl Observer for Watch<'_> {
 
     fn iterate(&mut self, iterate: &Iterate) {
         self.first.get_or_insert(iterate.energy);
-        self.observer.iterate(&Iterate { iteration: self.done + iterate.iteration, ..*iterate });
+        self.observer.iterate(&Iterate {
+            iteration: self.done + iterate.iteration,
+            ..*iterate
+        });
     }
 
     fn stop(&self) -> Option<StopReason> {

@@ -1,4 +1,4 @@
-//! Result meshes in few bytes: connectivity once per distinct mesh, positions in 16 bits, fields in 7, deflated, base64.
+//! Result meshes in few bytes: connectivity once per distinct mesh, positions in 13 bits, fields in 5 to 7, deflated, base64.
 //!
 //! Cells are sorted along a space-filling curve and points numbered as the cells first use them, so that differences of
 //! neighbours are small. Byte planes are stored one after the other, which deflate likes. Exact figures are in the VTU file.
@@ -9,8 +9,20 @@ use base64::Engine;
 use flate2::{Compression, write::DeflateEncoder};
 use std::io::Write;
 
-/// Field values have levels 0 to 126; 127 is undefined.
-const LEVELS: f64 = 126.0;
+/// Steps of a coordinate within its bounds.
+pub const STEPS: f64 = 8_191.0;
+
+/// The level of an undefined value.
+const UNDEFINED: u8 = 127;
+
+/// The highest level of a field's values: finer where a page has few of them.
+pub fn levels(values: usize) -> u8 {
+    match values {
+        0..250_000 => 126,
+        250_000..500_000 => 62,
+        _ => 30,
+    }
+}
 
 /// A mesh in the order in which it is stored.
 #[derive(Clone, Debug, PartialEq)]
@@ -146,21 +158,25 @@ pub fn topology(solid: &Solid, order: &Order) -> Packed {
     }
 }
 
-/// Image positions (where there is a source), fields and the marks of inverted cells.
-pub fn image(solid: &Solid, order: &Order, ranges: &[Scale]) -> Packed {
+/// Image positions (where there is a source), fields as differences from the cell before, and the marks of inverted cells.
+pub fn image(solid: &Solid, order: &Order, ranges: &[Scale], levels: u8) -> Packed {
     let mut bytes = Vec::new();
     let mut boxes = Vec::new();
     if solid.source.is_some() {
         boxes.push(positions(&solid.points, order, &mut bytes));
     }
     for (field, range) in solid.fields.iter().zip(ranges) {
+        let mut before = 0u8;
         bytes.extend(order.cells.iter().map(|&cell| {
             let place = range.position(field.values[cell as usize]);
-            if place.is_nan() {
-                127
+            let level = if place.is_nan() {
+                UNDEFINED
             } else {
-                (place * LEVELS).round() as u8
-            }
+                (place * f64::from(levels)).round() as u8
+            };
+            let step = level.wrapping_sub(before);
+            before = level;
+            step
         }));
     }
     bytes.extend(order.cells.iter().map(|&cell| u8::from(solid.inverted[cell as usize])));
@@ -170,14 +186,14 @@ pub fn image(solid: &Solid, order: &Order, ranges: &[Scale]) -> Packed {
     }
 }
 
-/// Appends each coordinate as the difference from the point before, in 16 bits, low bytes of an axis and then high ones.
+/// Appends each coordinate as the difference from the point before, in two bytes, low bytes of an axis and then high ones.
 fn positions(points: &[[f64; 3]], order: &Order, bytes: &mut Vec<u8>) -> [[f64; 3]; 2] {
     let used: Vec<[f64; 3]> = order.points.iter().map(|&point| points[point as usize]).collect();
     let bounds = bounds(&used);
     for axis in 0..3 {
         let levels: Vec<u16> = used
             .iter()
-            .map(|point| level(point[axis], bounds[0][axis], bounds[1][axis], 65_535.0) as u16)
+            .map(|point| level(point[axis], bounds[0][axis], bounds[1][axis], STEPS) as u16)
             .collect();
         let mut before = 0u16;
         let steps: Vec<u16> = levels

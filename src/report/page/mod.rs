@@ -47,7 +47,9 @@ pub fn write(
     if !charts.is_empty() {
         sections.push(("plots", "Plots", plots(charts)?));
     }
-    sections.push(("results", "Results", results.cards));
+    if !results.cards.is_empty() {
+        sections.push(("results", "Results", results.cards));
+    }
     sections.push(("jobs", "Jobs", jobs(rows)));
     sections.push(("provenance", "Provenance", provenance(experiment, rows)));
 
@@ -70,9 +72,9 @@ pub fn write(
     }
     page.push_str("</ul></nav>\n<main>");
     for (id, name, content) in &sections {
-        let _ = write!(
+        let _ = writeln!(
             page,
-            "<section aria-labelledby=\"{id}\"><h2 id=\"{id}\">{name}</h2>{content}</section>\n"
+            "<section aria-labelledby=\"{id}\"><h2 id=\"{id}\">{name}</h2>{content}</section>"
         );
     }
     page.push_str("</main><footer><p>Written by vargeo from stored records; unrounded figures in <a href=\"jobs.csv\">jobs.csv</a>, figures for prose in <a href=\"macros.tex\">macros.tex</a>.</p></footer>\n");
@@ -110,11 +112,12 @@ fn summary(rows: &[Row], verdicts: &[Verdict]) -> String {
         } else {
             ("well", "\u{2713}")
         };
-        let left = if skipped > 0 {
-            format!(", {skipped} skipped")
-        } else {
-            String::new()
-        };
+        let mut left = String::new();
+        for (count, word) in [(failed, "failed"), (skipped, "skipped")] {
+            if count > 0 {
+                let _ = write!(left, ", {count} {word}");
+            }
+        }
         let _ = write!(
             text,
             "<li class=\"{class}\"><b>{mark} {met} of {}</b><span>expectations met{left}</span></li>",
@@ -199,6 +202,11 @@ fn expectations(verdicts: &[Verdict]) -> String {
     text
 }
 
+/// A rate with a true minus sign.
+fn rate(value: f64) -> String {
+    super::rate::shown(value).replace('-', "\u{2212}")
+}
+
 fn rates(fits: &[Fit]) -> String {
     let spread = fits.iter().any(|fit| fit.spread.is_some());
     let mut text = String::from(
@@ -215,7 +223,7 @@ fn rates(fits: &[Fit]) -> String {
                 let error = line
                     .standard_error
                     .map_or_else(String::new, |error| format!(" \u{b1} {}", round(error, 2).unicode()));
-                format!("<b>{}</b>{error}", round(line.slope, 3).unicode())
+                format!("<b>{}</b>{error}", rate(line.slope))
             }
             None => "<i>none</i>".into(),
         };
@@ -239,11 +247,11 @@ fn rates(fits: &[Fit]) -> String {
             escape(&fit.y),
             escape(&fit.x),
             escape(&fit.series),
-            fit.last_pair.map_or_else(String::new, |last| round(last, 3).unicode())
+            fit.last_pair.map_or_else(String::new, rate)
         );
         if spread {
             let seeds = fit.spread.map_or_else(String::new, |(low, high, count)| {
-                format!("{} to {} ({count})", round(low, 3).unicode(), round(high, 3).unicode())
+                format!("{} to {} ({count})", rate(low), rate(high))
             });
             let _ = write!(text, "<td class=\"number\">{seeds}</td>");
         }
@@ -297,8 +305,8 @@ fn end(row: &Row) -> String {
 fn jobs(rows: &[Row]) -> String {
     let mut text = String::from(
         "<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"Jobs\"><table class=\"words\"><thead><tr><th scope=\"col\">job</th>\
-         <th scope=\"col\">status</th><th scope=\"col\">stop</th><th scope=\"col\">time <span class=\"unit\">[s]</span></th>\
-         <th scope=\"col\">peak memory</th><th scope=\"col\">timed</th><th scope=\"col\">reason and notices</th></tr></thead><tbody>",
+         <th scope=\"col\">status</th><th scope=\"col\">stop</th><th scope=\"col\">reason and notices</th>\
+         <th scope=\"col\">time <span class=\"unit\">[s]</span></th><th scope=\"col\">peak memory</th><th scope=\"col\">timed</th></tr></thead><tbody>",
     );
     for row in rows {
         let result = &row.record.result;
@@ -328,13 +336,13 @@ fn jobs(rows: &[Row]) -> String {
         };
         let _ = write!(
             text,
-            "<tr><th scope=\"row\">{}</th><td>{}</td><td>{}</td><td class=\"number\">{}</td><td class=\"number\">{memory}</td><td>{timed}</td><td class=\"wide\">{}</td></tr>",
+            "<tr><th scope=\"row\">{}</th><td>{}</td><td>{}</td><td class=\"wide\">{}</td><td class=\"number\">{}</td><td class=\"number\">{memory}</td><td>{timed}</td></tr>",
             escape(&row.name),
             status(result.status),
             end(row),
+            remarks.join("<br>"),
             row.figure("seconds")
-                .map_or_else(String::new, |seconds| round(seconds, 3).unicode()),
-            remarks.join("<br>")
+                .map_or_else(String::new, |seconds| round(seconds, 3).unicode())
         );
     }
     text.push_str("</tbody></table></div>");

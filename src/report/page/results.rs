@@ -32,7 +32,16 @@ type Loaded = Option<Result<Solid, String>>;
 pub fn results(experiment: &Experiment, rows: &[Row]) -> Result<Results, ReportError> {
     let solids: Vec<Loaded> = rows.iter().map(load).collect();
     let scales = scales(&solids);
-    let mut embedded = Embedded::default();
+    let values = solids
+        .iter()
+        .flatten()
+        .flatten()
+        .map(|solid| solid.count() * solid.fields.len())
+        .sum();
+    let mut embedded = Embedded {
+        levels: mesh::levels(values),
+        ..Embedded::default()
+    };
     let mut cards = String::new();
     let mut left_out = Vec::new();
     let mut shown_field = None;
@@ -56,7 +65,9 @@ pub fn results(experiment: &Experiment, rows: &[Row]) -> Result<Results, ReportE
                 "<p class=\"none\">The result mesh cannot be shown: {}</p>",
                 escape(error)
             ),
-            None => "<p class=\"none\">no result mesh</p>".into(),
+            // The table of jobs holds those that ended well and left no mesh.
+            None if row.done() => continue,
+            None => String::new(),
         };
         cards.push_str(&card(experiment, row, &picture));
     }
@@ -91,7 +102,9 @@ pub fn results(experiment: &Experiment, rows: &[Row]) -> Result<Results, ReportE
             escape(&left_out.join(", "))
         );
     }
-    let _ = write!(text, "<div class=\"cards\">{cards}</div>");
+    if !cards.is_empty() {
+        let _ = write!(text, "<div class=\"cards\">{cards}</div>");
+    }
     Ok(Results {
         cards: text,
         data: embedded.finish(&scales),
@@ -162,7 +175,7 @@ fn picture(row: &Row, solid: &Solid, field: Option<&str>, png: &[u8], index: Opt
         ""
     };
     format!(
-        "<div class=\"picture\"{view}><img loading=\"lazy\" width=\"{}\" height=\"{}\" alt=\"{}\" src=\"data:image/png;base64,{}\">{button}</div>",
+        "<div class=\"picture\"{view}><img width=\"{}\" height=\"{}\" alt=\"{}\" src=\"data:image/png;base64,{}\">{button}</div>",
         crate::report::picture::WIDTH,
         crate::report::picture::HEIGHT,
         escape(&alternative),
@@ -243,6 +256,7 @@ struct Embedded<'a> {
     mesh_facts: Vec<Value>,
     job_facts: Vec<Value>,
     scripts: String,
+    levels: u8,
 }
 
 impl<'a> Embedded<'a> {
@@ -274,7 +288,7 @@ impl<'a> Embedded<'a> {
             }
         };
         let ranges: Vec<Scale> = solid.fields.iter().map(|field| scales[&field.name]).collect();
-        let packed = mesh::image(solid, &self.meshes[number].1, &ranges);
+        let packed = mesh::image(solid, &self.meshes[number].1, &ranges, self.levels);
         let index = self.job_facts.len();
         let names: Vec<&str> = solid.fields.iter().map(|field| field.name.as_str()).collect();
         self.job_facts.push(json!({
@@ -316,6 +330,8 @@ impl<'a> Embedded<'a> {
             "eye": EYE,
             "cut": cut,
             "map": MAP,
+            "levels": self.levels,
+            "steps": mesh::STEPS,
             "scales": scales,
             "meshes": self.mesh_facts,
             "jobs": self.job_facts,
@@ -325,7 +341,16 @@ impl<'a> Embedded<'a> {
             include_str!("viewer.html"),
             json(&data),
             self.scripts,
-            include_str!("viewer.js")
+            viewer()
         )
     }
+}
+
+/// The viewer without its comments and indentation.
+fn viewer() -> String {
+    let lines = include_str!("viewer.js").lines().map(str::trim);
+    lines
+        .filter(|line| !line.is_empty() && !line.starts_with("//"))
+        .collect::<Vec<_>>()
+        .join("\n")
 }

@@ -21,7 +21,7 @@
       for (let i = 0, v = 0; i < n; i++) {
         const z = bytes[at + i] | bytes[at + n + i] << 8;
         v = (v + (z >> 1 ^ -(z & 1))) & 65535;
-        out[3 * i + a] = low[a] + (high[a] - low[a]) * v / 65535;
+        out[3 * i + a] = low[a] + (high[a] - low[a]) * v / data.steps;
       }
     return out;
   };
@@ -54,7 +54,8 @@
     const job = data.jobs[j], m = data.meshes[job.mesh], mesh = await topology(job.mesh), bytes = await inflate("job-" + j);
     let at = 0, image = mesh.source;
     if (job.box) { image = positions(bytes, 0, m.points, job.box); at = 6 * m.points; }
-    const fields = job.fields.map((_, i) => bytes.subarray(at + i * m.cells, at + (i + 1) * m.cells));
+    const fields = job.fields.map((_, i) => bytes.slice(at + i * m.cells, at + (i + 1) * m.cells));
+    for (const f of fields) for (let i = 1; i < f.length; i++) f[i] += f[i - 1];
     return results[j] = { job, mesh, image, fields, inverted: bytes.subarray(at + fields.length * m.cells) };
   };
 
@@ -109,7 +110,7 @@ o=vec4(mix(c*s,vec3(.05),k*wire),1.);}`));
     const { mesh, fields, inverted } = shown, { c, n, cells, neighbour } = mesh, out = [];
     const field = fields[state.field], cut = plane(), on = !!state.cut && c === 4;
     const high = v => cut[0] * points[3 * v] + cut[1] * points[3 * v + 1] + cut[2] * points[3 * v + 2] - cut[3];
-    const value = t => field ? (field[t] > 126 ? -1 : field[t] / 126) : .35;
+    const value = t => field ? (field[t] === 127 ? -1 : field[t] / data.levels) : .35;
     const corner = (p, i, t, e, cap) => out.push(p[0], p[1], p[2], value(t), ...e[i], inverted[t] + cap);
     const E = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
     const at = v => points.subarray(3 * v, 3 * v + 3);
@@ -162,7 +163,7 @@ o=vec4(mix(c*s,vec3(.05),k*wire),1.);}`));
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     const { turn, tilt, zoom, pan } = state, ct = Math.cos(turn), st = Math.sin(turn), ce = Math.cos(tilt), se = Math.sin(tilt);
     const right = [-st, ct, 0], up = [-ct * se, -st * se, ce], back = [ct * ce, st * ce, se];
-    const focus = 4, distance = focus * radius, f = focus / 1.08 * zoom, aspect = w / h, near = distance - 1.5 * radius, far = distance + 1.5 * radius;
+    const focus = 4, distance = focus * radius, f = focus / 1.1 * zoom, aspect = w / h, near = distance - 1.5 * radius, far = distance + 1.5 * radius;
     const sx = f / Math.max(aspect, 1), sy = f * Math.min(aspect, 1);
     const a = (far + near) / (near - far), b = 2 * far * near / (near - far), m = [];
     const dot = (p, q) => p[0] * q[0] + p[1] * q[1] + p[2] * q[2];
@@ -173,7 +174,7 @@ o=vec4(mix(c*s,vec3(.05),k*wire),1.);}`));
     gl.uniform3fv(uniform("eye"), [0, 1, 2].map(i => centre[i] + distance * back[i] + .25 * distance * up[i] - .3 * distance * right[i]));
     gl.uniform4fv(uniform("plane"), shown.clip ? plane() : [0, 0, 0, 1]);
     gl.uniform2fv(uniform("range"), shades());
-    gl.uniform1f(uniform("wire"), state.wire ? .55 : 0);
+    gl.uniform1f(uniform("wire"), state.wire ? .4 : 0);
     gl.drawArrays(gl.TRIANGLES, 0, count);
   };
   let pending = false;
@@ -214,7 +215,9 @@ o=vec4(mix(c*s,vec3(.05),k*wire),1.);}`));
     for (let i = 0; i < points.length; i++) { const a = i % 3; low[a] = Math.min(low[a], points[i]); high[a] = Math.max(high[a], points[i]); }
     centre = low.map((l, a) => (l + high[a]) / 2);
     half = low.map((l, a) => (high[a] - l) / 2);
-    radius = Math.hypot(...half) || 1;
+    radius = 0;
+    for (let i = 0; i < points.length; i += 3) radius = Math.max(radius, Math.hypot(points[i] - centre[0], points[i + 1] - centre[1], points[i + 2] - centre[2]));
+    radius = radius || 1;
   };
   const redo = () => { if (shown) { build(); draw(); } };
   const choose = async j => {

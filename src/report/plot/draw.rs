@@ -12,7 +12,7 @@ use std::sync::OnceLock;
 /// Width of the canvas.
 pub const WIDTH: u32 = 3200;
 /// Size of a text's em.
-pub const TEXT: u32 = 62;
+pub const TEXT: u32 = 70;
 /// The name under which the embedded typeface is registered.
 pub const FONT: &str = "sans-serif";
 
@@ -377,7 +377,7 @@ impl<B: DrawingBackend> Pen<'_, B> {
         for ((index, end), place) in ends.into_iter().zip(places) {
             let role = Role::Series(index);
             if chart.series[index].joined && end.0 >= layout.right - 400 {
-                self.line(vec![(end.0 + 14, end.1), (left, place)], Role::Grid.stroke(4))?;
+                self.line(vec![(end.0 + 40, end.1), (left - 10, place)], Role::Grid.stroke(4))?;
             }
             if chart.series[index].joined {
                 self.dashed(&[(left, place), (left + 150, place)], dashes(index), role.stroke(9))?;

@@ -52,7 +52,11 @@ const PHASES: &[&str] = &["phase", "stage"];
 /// The data that the file's `[[plot]]` asks for.
 pub fn chart(experiment: &Experiment, plot: &Plot, rows: &[Row]) -> Chart {
     let chosen: Vec<&Row> = rows.iter().filter(|row| row.matches(&plot.condition)).collect();
-    let is_trace = chosen.iter().any(|row| row.record.result.traces.contains_key(&plot.x));
+    // An axis may have a trace's name, such as `energy`.
+    let is_axis = chosen
+        .iter()
+        .any(|row| row.axes.iter().any(|(axis, _)| *axis == plot.x));
+    let is_trace = !is_axis && chosen.iter().any(|row| row.record.result.traces.contains_key(&plot.x));
     let mut notes = Vec::new();
     let mut categories: Vec<String> = Vec::new();
     let mut series = if is_trace {
@@ -183,7 +187,7 @@ fn traces(plot: &Plot, chosen: &[&Row], notes: &mut Vec<String>) -> Vec<Series> 
         });
     }
     if !without.is_empty() {
-        notes.push(format!("Without a trace: {}.", without.join(", ")));
+        notes.push(format!("Without a trace: {}.", some(&without)));
     }
     if series.iter().any(|one| !one.phases.is_empty()) {
         notes.push("Short upright strokes on a line mark the beginning of a new phase.".into());
@@ -195,12 +199,12 @@ fn figures(plot: &Plot, chosen: &[&Row], categories: &mut Vec<String>, notes: &m
     let numeric = chosen
         .iter()
         .filter(|row| row.done())
-        .all(|row| row.figure(&plot.x).is_some());
+        .all(|row| row.coordinate(&plot.x).is_some());
     let mut series: Vec<(Series, Vec<Vec<f64>>)> = Vec::new();
     let mut without = Vec::new();
     for row in chosen {
         let x = if numeric {
-            row.figure(&plot.x)
+            row.coordinate(&plot.x)
         } else {
             row.axis(&plot.x).map(|value| {
                 let name = label(value);
@@ -253,9 +257,18 @@ fn figures(plot: &Plot, chosen: &[&Row], categories: &mut Vec<String>, notes: &m
         );
     }
     if !without.is_empty() {
-        notes.push(format!("Without a figure: {}.", without.join(", ")));
+        notes.push(format!("Without a figure: {}.", some(&without)));
     }
     series.into_iter().map(|(one, _)| one).collect()
+}
+
+/// The first few names, and how many more there are.
+fn some(names: &[&str]) -> String {
+    const MOST: usize = 6;
+    match names.len().checked_sub(MOST) {
+        Some(more) if more > 1 => format!("{} and {more} more", names[..MOST].join(", ")),
+        _ => names.join(", "),
+    }
 }
 
 /// Long traces keep at most some 800 points: first, last, and the lowest and highest of each stretch between.

@@ -67,11 +67,6 @@ fn hexadecimal(bytes: &[u8]) -> String {
         })
 }
 
-/// SHA-256 of some bytes in lower-case hexadecimal.
-pub fn sha256(bytes: &[u8]) -> String {
-    hexadecimal(&Sha256::digest(bytes))
-}
-
 /// Length and hash of everything that a reader yields, without holding it in memory.
 pub(super) fn measure(reader: &mut impl Read) -> io::Result<FileEntry> {
     let mut hasher = Sha256::new();

@@ -22,12 +22,11 @@ mod publish;
 mod upkeep;
 
 pub use lock::{Lock, Sharing};
-pub use manifest::sha256;
 pub use publish::{Publication, Step};
 pub use upkeep::{Damage, Garbage, GarbageKind, Statistics};
 
-use crate::experiment::job::Key;
-use crate::experiment::record::{JobResult, Record};
+use crate::experiment::job::{Key, sha256};
+use crate::experiment::record::{JobResult, RECORD_SCHEMA, Record};
 use manifest::Manifest;
 use std::fs::{File, Permissions};
 use std::io;
@@ -152,7 +151,7 @@ impl Store {
             let before = identity(&entry);
             match read_entry(&entry, key) {
                 Ok(record) => return Lookup::Hit(Box::new(record)),
-                Err(Fault::Absent) => return Lookup::Miss,
+                Err(Fault::Absent | Fault::OtherSchema) => return Lookup::Miss,
                 Err(_) if identity(&entry) != before => {}
                 Err(Fault::Unreadable(reason)) => {
                     return Lookup::Damaged {
@@ -245,6 +244,8 @@ fn identity(entry: &Path) -> Option<(u64, u64)> {
 /// Why an entry cannot be used.
 enum Fault {
     Absent,
+    /// Sound, and written by a vargeo with another layout of records; no key of this one leads here.
+    OtherSchema,
     /// The content is not what was published.
     Damaged(String),
     /// The system refused to read.
@@ -315,10 +316,9 @@ fn read_entry(entry: &Path, key: &Key) -> Result<Record, Fault> {
             )));
         }
     }
-    let record: Record = serde_json::from_slice(&record.unwrap_or_default())
-        .map_err(|error| Fault::Damaged(format!("{RECORD} is no record: {error}")))?;
-    if record.key != *key {
-        return Err(Fault::Damaged(format!("{RECORD} is that of {}", record.key.0)));
+    let record = parse_record(&record.unwrap_or_default())?;
+    if record.key != *key || Key::of(&record.job) != *key {
+        return Err(Fault::Damaged(format!("{RECORD} is that of {}", record.key)));
     }
     for (name, hash) in &record.result.artifacts {
         if manifest.files.get(name).is_none_or(|file| file.sha256 != *hash) {
@@ -326,6 +326,16 @@ fn read_entry(entry: &Path, key: &Key) -> Result<Record, Fault> {
         }
     }
     Ok(record)
+}
+
+fn parse_record(bytes: &[u8]) -> Result<Record, Fault> {
+    let no_record = |error: serde_json::Error| Fault::Damaged(format!("{RECORD} is no record: {error}"));
+    let value: serde_json::Value = serde_json::from_slice(bytes).map_err(no_record)?;
+    let schema = value["job"]["record_schema"].as_u64();
+    if schema.is_some_and(|schema| schema != u64::from(RECORD_SCHEMA)) {
+        return Err(Fault::OtherSchema);
+    }
+    serde_json::from_value(value).map_err(no_record)
 }
 
 /// SHA-256 over what must be the same to the last bit whenever a job is computed.

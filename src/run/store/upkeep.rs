@@ -73,7 +73,8 @@ impl Store {
             .into_par_iter()
             .filter_map(|key| match self.lookup(&key) {
                 Lookup::Hit(_) => Some(None),
-                Lookup::Miss => None,
+                // Written with another layout of records, or just removed by another process.
+                Lookup::Miss => self.entry(&key).is_dir().then_some(None),
                 Lookup::Damaged { reason, quarantine } => Some(Some(Damage {
                     key,
                     reason,

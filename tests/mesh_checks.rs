@@ -1,9 +1,10 @@
 //! Every kind of problem of a mesh is found, counted and placed; reversed tetrahedra are repaired and nothing else is.
 
 use serde_json::json;
-use vargeo::mesh::check::{Problem, Severity, summarize_tetrahedra, summarize_triangles, tetrahedra, triangles};
+use vargeo::mesh::check::{Problem, Severity, tetrahedra, triangles};
 use vargeo::mesh::connectivity::boundary;
 use vargeo::mesh::generate::lattice::body_centred;
+use vargeo::mesh::summary::{summarize_tetrahedra, summarize_triangles};
 use vargeo::mesh::target::{from_mesh, list, shape};
 use vargeo::mesh::{TetrahedralMesh, TriangleMesh};
 

@@ -392,7 +392,7 @@ pub fn inverted_about(boundary: &Boundary, positions: &[[f64; 3]], centre: [f64;
             let [a, b, c] =
                 boundary.triangles[triangle as usize].map(|vertex| positions[place[vertex as usize] as usize]);
             let volume = determinant([centre, a, b, c]);
-            !(volume > 0.0)
+            volume.is_nan() || volume <= 0.0
         })
         .collect()
 }

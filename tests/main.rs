@@ -1,3 +1,23 @@
+//! One test binary; a file a property.
+
+mod connectivity;
+mod damaged_files;
 mod energies;
+mod experiment_files;
+mod floors;
+mod formats;
+mod gate;
+mod generators;
 mod kernels;
 mod mapping;
+mod mesh_checks;
+mod page;
+mod rates;
+mod reports;
+mod runner;
+mod sample;
+mod sparse;
+mod store;
+mod tiny_method;
+mod volume_map;
+mod volume_map_feasibility;

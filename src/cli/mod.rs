@@ -1,6 +1,19 @@
 //! The command line: one command a file, each with its arguments and its `execute`.
 
+mod explain;
+mod input;
+mod check;
+mod compare;
+mod job;
 mod list;
+mod mesh;
+mod new;
+mod plan;
+mod progress;
+mod report;
+mod run;
+mod schema;
+mod store;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
@@ -35,7 +48,19 @@ const EXIT_CODES: &str = "Exit codes: 0 all well, 1 an expectation was not met, 
 
 #[derive(Subcommand)]
 enum Command {
+    Run(run::Arguments),
+    Plan(plan::Arguments),
+    New(new::Arguments),
+    Check(check::Arguments),
+    Report(report::Arguments),
+    Compare(compare::Arguments),
     List(list::Arguments),
+    Schema(schema::Arguments),
+    Explain(explain::Arguments),
+    Mesh(mesh::Arguments),
+    Store(store::Arguments),
+    #[command(hide = true)]
+    Job(job::Arguments),
 }
 
 /// Reads the process's arguments and runs the command that they name.
@@ -53,7 +78,18 @@ pub fn main() -> ExitCode {
         }
     };
     let exit = match arguments.command {
+        Command::Run(arguments) => run::execute(arguments),
+        Command::Plan(arguments) => plan::execute(arguments),
+        Command::New(arguments) => new::execute(arguments),
+        Command::Schema(arguments) => schema::execute(arguments),
+        Command::Explain(arguments) => explain::execute(arguments),
+        Command::Check(arguments) => check::execute(arguments),
+        Command::Report(arguments) => report::execute(arguments),
+        Command::Compare(arguments) => compare::execute(arguments),
         Command::List(arguments) => list::execute(arguments),
+        Command::Mesh(arguments) => mesh::execute(arguments),
+        Command::Store(arguments) => store::execute(arguments),
+        Command::Job(arguments) => job::execute(arguments),
     };
     ExitCode::from(exit as u8)
 }

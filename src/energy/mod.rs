@@ -27,6 +27,7 @@ pub mod mean_ratio;
 
 pub mod lim_barrier;
 pub mod untangling;
+pub mod target_weighted;
 pub mod mapping;
 
 use crate::linalg::lanes::Lanes;

@@ -1,8 +1,12 @@
 //! An experiment as its file states it: every name checked, every default filled, nothing run.
 
+use super::diagnostic::{Diagnostic, Source};
 use crate::method::Method;
 use serde_json::Value;
 use std::collections::BTreeMap;
+use std::ops::Range;
+use std::path::PathBuf;
+use std::sync::Arc;
 
 /// A named model of the file.
 #[derive(Clone, Debug, PartialEq)]
@@ -48,17 +52,17 @@ pub struct Timing {
 /// A condition on the axes: `{ energy = "stretch", model = ["ball", "duck"] }`; a list means any of.
 pub type Condition = BTreeMap<String, Vec<Value>>;
 
-/// `[[table]]`
+/// `[[table]]`. Columns are names of [`super::column::columns`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Table {
     pub name: String,
     pub title: Option<String>,
     /// Axes whose values head each row.
     pub rows: Vec<String>,
-    /// Metrics.
+    /// Metrics, counters and measurements.
     pub columns: Vec<String>,
     pub condition: Condition,
-    /// Printed figures: rows of axis values and metric values; `tolerance` is relative.
+    /// Printed figures: rows of axis values and metric values.
     pub published: Option<Published>,
 }
 
@@ -68,7 +72,8 @@ pub struct Published {
     /// Where they were printed: `Table 1 of the paper`, and the machine for times.
     pub source: String,
     pub machine: Option<String>,
-    /// Each row holds axis values by axis name and printed numbers by metric name.
+    /// Each row holds axis values by axis name and printed numbers, as whole or not as they are written, by the names of
+    /// the table's columns; `tolerance`, if there, is relative and stands for this row.
     pub rows: Vec<BTreeMap<String, Value>>,
 }
 
@@ -77,7 +82,7 @@ pub struct Published {
 pub struct Plot {
     pub name: String,
     pub title: Option<String>,
-    /// A trace column such as `iteration`, a metric, or a numeric axis.
+    /// A trace such as `iteration`, a column, or an axis, whose values may be words.
     pub x: String,
     pub y: String,
     /// Axes whose values tell the series apart.
@@ -117,19 +122,31 @@ pub struct Expectation {
     /// The stop reason that must be met, such as `converged` or `infeasible`.
     pub stop: Option<String>,
     pub bounds: BTreeMap<String, Bound>,
-    /// `{ d_ma = { below = { energy = "dirichlet" } } }`: our metric below that of the job that differs only in these axes.
+    /// `d_ma = { less_than = { energy = "dirichlet" } }`: our metric below that of the job that differs only in these axes.
     pub comparisons: Vec<Comparison>,
     /// 1-based line in the file, for messages.
     pub line: usize,
 }
 
-/// A metric of one job against the same metric of another that differs in the given axes.
+/// A metric of one job against the same metric of the others that have the given axis values and agree in all other axes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Comparison {
     pub metric: String,
     pub other: Condition,
-    /// Ours must be at most `factor` times the other's.
+    /// Ours must be less than `factor` times the other's.
     pub factor: f64,
+}
+
+/// Where an experiment was read from, so that what a plan finds can be underlined in the file.
+#[derive(Clone, Debug, Default)]
+pub struct Origin {
+    pub source: Arc<Source>,
+    /// Folder of the file: relative paths in it begin here.
+    pub folder: PathBuf,
+    /// Bytes of each entry, by dotted path such as `vary.energy` or `models.duck.mesh`.
+    pub places: BTreeMap<String, Range<usize>>,
+    /// What is doubtful but no error.
+    pub warnings: Vec<Diagnostic>,
 }
 
 /// A checked experiment file.
@@ -143,7 +160,8 @@ pub struct Experiment {
     pub models: Vec<Model>,
     /// Complete settings held for every job.
     pub settings: Value,
-    /// Axes in the order of the file; the last varies fastest.
+    /// Axes in the order of the file; the last varies fastest. `model` is always among the axes of a method that has
+    /// models: first, and with all of them, where the file does not list it.
     pub axes: Vec<Axis>,
     /// Groups of axes that move together; each group counts as one axis after those of `vary`.
     pub zips: Vec<Vec<Axis>>,
@@ -154,4 +172,5 @@ pub struct Experiment {
     pub plots: Vec<Plot>,
     pub rates: Vec<Rate>,
     pub expectations: Vec<Expectation>,
+    pub origin: Origin,
 }

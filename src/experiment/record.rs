@@ -1,6 +1,7 @@
 //! What a job leaves: a deterministic result, and measurements of how it was obtained.
 
 use super::job::{Job, Key};
+use crate::metric::{Better, Metric};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -80,6 +81,72 @@ pub struct Measurement {
     /// Input file names as given, by role: for the reader, not part of the key.
     pub inputs: BTreeMap<String, String>,
 }
+
+/// Measurements that tables, plots and expectations may name beside a method's metrics.
+pub const MEASUREMENTS: &[Metric] = &[
+    Metric {
+        name: "seconds",
+        symbol: "time",
+        unit: "s",
+        floor: Some(0.0),
+        better: Better::Lower,
+        definition: "wall-clock time of the method, median over the repetitions",
+    },
+    Metric {
+        name: "cpu_seconds",
+        symbol: "CPU time",
+        unit: "s",
+        floor: Some(0.0),
+        better: Better::Lower,
+        definition: "processor time of the method over all threads, median over the repetitions",
+    },
+    Metric {
+        name: "peak_memory",
+        symbol: "memory",
+        unit: "MiB",
+        floor: Some(0.0),
+        better: Better::Lower,
+        definition: "peak resident memory of the job's process",
+    },
+    Metric {
+        name: "threads",
+        symbol: "threads",
+        unit: "",
+        floor: None,
+        better: Better::Neither,
+        definition: "threads that the job was given",
+    },
+];
+
+/// Words that a record's `stop` may hold beside those of a method, with their meanings.
+pub const STOPS: &[(&str, &str)] = &[
+    ("converged", "a convergence criterion was met"),
+    ("stalled", "no acceptable step was found although no criterion was met"),
+    ("step-limit", "the permitted number of iterations was used up"),
+    ("not-finite", "the energy or its gradient is not a finite number"),
+    (
+        "infeasible",
+        "the problem has no admissible solution, with the obstacles named",
+    ),
+    ("invalid-input", "a model or a setting cannot be used"),
+    (
+        "invalid-start",
+        "the start is outside the energy's domain and may not be mended",
+    ),
+    ("time-limit", "the time of `limits` was used up"),
+    ("memory-limit", "the memory of `limits` was used up"),
+    ("cancelled", "the user asked to stop"),
+    ("crashed", "the job's process ended by a signal"),
+    ("panicked", "the job ran into a defect of the program"),
+    ("missing-model", "an optional model's file is absent"),
+    ("not-started", "the job's process could not be started"),
+    (
+        "not-stored",
+        "the result was computed but could not be written to the store",
+    ),
+    ("input-changed", "an input file changed after the run was planned"),
+    ("input-unreadable", "an input file could not be read"),
+];
 
 mod word {
     /// The word for a number that JSON cannot hold.

@@ -15,3 +15,4 @@ pub mod processor;
 pub mod vector3;
 pub mod svd3;
 pub mod eigen3;
+pub mod sparse;

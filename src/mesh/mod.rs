@@ -2,6 +2,14 @@
 //!
 //! Nothing here opens a file: readers take bytes, writers take `std::io::Write`.
 
+pub mod connectivity;
+pub mod quality;
+pub mod split;
+pub mod check;
+pub mod generate;
+pub mod target;
+pub mod format;
+
 /// A mesh of cells with `N` vertices each: `points` in model units, `cells` as indices into `points`.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Mesh<const N: usize> {
@@ -13,3 +21,110 @@ pub struct Mesh<const N: usize> {
 pub type TriangleMesh = Mesh<3>;
 /// Tetrahedra (0,1,2,3), positively oriented when `det[x1-x0, x2-x0, x3-x0] > 0`.
 pub type TetrahedralMesh = Mesh<4>;
+
+/// `a - b`.
+pub(crate) fn subtract(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+/// The scalar product.
+pub(crate) fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+/// The vector product.
+pub(crate) fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    ]
+}
+
+/// The Euclidean length.
+pub(crate) fn length(a: [f64; 3]) -> f64 {
+    dot(a, a).sqrt()
+}
+
+/// Smallest axis-aligned box around the points, as lower and upper corner; `None` without points.
+pub fn bounding_box(points: &[[f64; 3]]) -> Option<[[f64; 3]; 2]> {
+    let first = *points.first()?;
+    Some(points.iter().fold([first, first], |[low, high], point| {
+        [
+            std::array::from_fn(|axis| low[axis].min(point[axis])),
+            std::array::from_fn(|axis| high[axis].max(point[axis])),
+        ]
+    }))
+}
+
+/// Length of the diagonal of the bounding box; zero without points.
+pub fn diagonal(points: &[[f64; 3]]) -> f64 {
+    bounding_box(points).map_or(0.0, |[low, high]| length(subtract(high, low)))
+}
+
+impl<const N: usize> Mesh<N> {
+    /// The points of one cell.
+    pub fn corners(&self, cell: [u32; N]) -> [[f64; 3]; N] {
+        cell.map(|vertex| self.points[vertex as usize])
+    }
+}
+
+/// Six times the signed volume, `det[x1-x0, x2-x0, x3-x0]`.
+pub fn determinant([a, b, c, d]: [[f64; 3]; 4]) -> f64 {
+    dot(subtract(b, a), cross(subtract(c, a), subtract(d, a)))
+}
+
+/// Twice the oriented area: `(x1-x0) x (x2-x0)`.
+pub fn area_vector([a, b, c]: [[f64; 3]; 3]) -> [f64; 3] {
+    cross(subtract(b, a), subtract(c, a))
+}
+
+impl TetrahedralMesh {
+    /// Signed volume of every tetrahedron.
+    pub fn volumes(&self) -> Vec<f64> {
+        self.cells
+            .iter()
+            .map(|&cell| determinant(self.corners(cell)) / 6.0)
+            .collect()
+    }
+
+    /// Sum of the signed volumes.
+    pub fn volume(&self) -> f64 {
+        self.cells
+            .iter()
+            .map(|&cell| determinant(self.corners(cell)) / 6.0)
+            .sum()
+    }
+}
+
+impl TriangleMesh {
+    /// Area of every triangle.
+    pub fn areas(&self) -> Vec<f64> {
+        self.cells
+            .iter()
+            .map(|&cell| length(area_vector(self.corners(cell))) / 2.0)
+            .collect()
+    }
+
+    /// Sum of the areas.
+    pub fn area(&self) -> f64 {
+        self.cells
+            .iter()
+            .map(|&cell| length(area_vector(self.corners(cell))) / 2.0)
+            .sum()
+    }
+
+    /// Volume enclosed by a closed surface, by the divergence theorem; positive for outward normals. Meaningless for an
+    /// open surface.
+    pub fn enclosed_volume(&self) -> f64 {
+        // Measured from the first point, so that a distant origin costs no digits.
+        let Some(&origin) = self.points.first() else { return 0.0 };
+        self.cells
+            .iter()
+            .map(|&cell| {
+                let [a, b, c] = self.corners(cell).map(|point| subtract(point, origin));
+                dot(a, cross(b, c)) / 6.0
+            })
+            .sum()
+    }
+}

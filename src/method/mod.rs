@@ -5,6 +5,7 @@
 
 pub mod setting;
 pub mod model;
+pub mod volume_map;
 
 use crate::metric::Metric;
 use crate::optimize::Observer;
@@ -75,12 +76,20 @@ pub trait Method: Sync {
     }
     /// The metrics that every record of this method holds.
     fn metrics(&self) -> &'static [Metric];
+    /// Names and meanings of the columns in [`Outcome::traces`], such as `iteration` and `energy`.
+    fn traces(&self) -> &'static [(&'static str, &'static str)] {
+        &[]
+    }
+    /// Names and meanings of [`Outcome::counters`], such as `iterations`; none may be a metric's name too.
+    fn counters(&self) -> &'static [(&'static str, &'static str)] {
+        &[]
+    }
     fn run(&self, inputs: Inputs<'_>, observer: &mut dyn Observer) -> Result<Outcome, Failure>;
 }
 
 /// Every method, in the order of the documentation.
 pub fn methods() -> &'static [&'static dyn Method] {
-    &[]
+    &[&volume_map::VolumeMap]
 }
 
 /// The method of this name.

@@ -40,7 +40,7 @@ pub enum Kind {
     File,
     /// A table with these fields.
     Table(&'static [Field]),
-    /// A table with one of several sets of fields: the choice is the key, `{ generate = "ball", ... }` has none of this.
+    /// Any number of values of one kind.
     List(&'static Kind),
     /// Any of these kinds, tried in order by TOML type; at most one per TOML type.
     OneOf(&'static [Kind]),

@@ -1,0 +1,54 @@
+//! `vargeo compare`: two result sets side by side.
+
+use super::Exit;
+use crate::report::compare::{Sheet, compare, describe};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+/// Compares the figures of two result folders of one experiment, job by job.
+///
+/// Ends with 1 when a result differs; times and memory are shown and never count.
+#[derive(clap::Args)]
+pub struct Arguments {
+    /// A folder such as results/quickstart, or its jobs.csv.
+    left: PathBuf,
+    /// Another one.
+    right: PathBuf,
+}
+
+/// Reads both and prints what differs.
+pub fn execute(arguments: Arguments) -> Exit {
+    let sheets = read(&arguments.left).and_then(|left| Ok((left, read(&arguments.right)?)));
+    let (left, right) = match sheets {
+        Ok(sheets) => sheets,
+        Err(error) => {
+            eprintln!("error: {error}");
+            return Exit::FileWrong;
+        }
+    };
+    let comparison = compare(&left, &right);
+    let name = |path: &Path| path.display().to_string();
+    // A reader who has gone away is no error.
+    let _ =
+        std::io::stdout().write_all(describe(&comparison, &name(&arguments.left), &name(&arguments.right)).as_bytes());
+    if comparison.same() {
+        Exit::Well
+    } else {
+        Exit::ExpectationFailed
+    }
+}
+
+fn read(path: &Path) -> Result<Sheet, String> {
+    let file = if path.is_dir() {
+        path.join("jobs.csv")
+    } else {
+        path.to_path_buf()
+    };
+    let bytes = std::fs::read(&file).map_err(|error| {
+        format!(
+            "cannot read {}: {error}\nhelp: name a folder that `vargeo run` wrote, such as results/quickstart",
+            file.display()
+        )
+    })?;
+    Sheet::read(&bytes).map_err(|error| format!("{}: {error}", file.display()))
+}

@@ -1,0 +1,253 @@
+//! `vargeo run`: every job of an experiment that is not stored yet, then the report.
+
+use super::input::Input;
+use super::{Exit, progress};
+use crate::experiment::file::Experiment;
+use crate::experiment::grid;
+use crate::experiment::nearest::suggestion;
+use crate::experiment::plan::Plan;
+use crate::experiment::record::{Record, Status};
+use crate::report::{self, Row};
+use crate::run::interrupt::Interrupt;
+use crate::run::store::{MESH, Store};
+use crate::run::{Finished, Options, Program, Run, run_plan};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+/// Computes every job of an experiment that is not stored yet, and writes tables, plots, pictures and the page.
+///
+/// Finished jobs are kept, whatever happens to the others: the same command goes on where the last one ended.
+#[derive(clap::Args)]
+pub struct Arguments {
+    #[command(flatten)]
+    input: Input,
+    #[command(flatten)]
+    running: Running,
+}
+
+/// How they are computed.
+#[derive(clap::Args)]
+pub(super) struct Running {
+    /// Folder of results.
+    #[arg(long, value_name = "DIR", default_value = "results")]
+    results: PathBuf,
+    /// Jobs side by side; as many as the cores permit by default, and one where times are taken exclusively.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=4096))]
+    jobs: Option<u32>,
+    /// Threads of each job; what the file's [timing] says by default, else 1. Results do not depend on it.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=4096))]
+    threads: Option<u32>,
+    /// Only jobs whose name contains this; the others are reported as far as they are stored.
+    #[arg(long, value_name = "NAME")]
+    only: Vec<String>,
+    /// Compute stored jobs again, and compare.
+    #[arg(long)]
+    force: bool,
+    /// Show warnings and errors only.
+    #[arg(long, short)]
+    quiet: bool,
+}
+
+/// Runs, then reports.
+pub fn execute(arguments: Arguments) -> Exit {
+    match arguments.input.plan().and_then(|plan| run(&plan, &arguments.running)) {
+        Ok(done) => done.exit,
+        Err(exit) => exit,
+    }
+}
+
+/// What a run and its report leave.
+pub(super) struct Done {
+    pub(super) exit: Exit,
+    pub(super) rows: Vec<Row>,
+    /// Absent when the run was interrupted.
+    pub(super) written: Option<report::Written>,
+}
+
+/// Runs what is missing and writes the report.
+pub(super) fn run(plan: &Plan, running: &Running) -> Result<Done, Exit> {
+    let store = Store::new(running.results.join("store"));
+    let chosen = choose(plan, &running.only)?;
+    if !running.quiet {
+        say(&format!("{}: {} jobs", plan.experiment.title, plan.jobs.len()));
+        plan.notices.iter().for_each(|notice| eprintln!("notice: {notice}"));
+    }
+    let interrupt = Interrupt::default();
+    // Whoever asks twice does not want to wait; job processes end with this one.
+    interrupt.listen(|count| {
+        if count > 1 {
+            std::process::exit(Exit::Interrupted as i32);
+        }
+    });
+    let options = Options {
+        store: store.clone(),
+        program: Program::this().map_err(|error| wrong(&format!("cannot find the program itself: {error}")))?,
+        side_by_side: running.jobs.map(|jobs| jobs as usize),
+        threads: running.threads.map(|threads| threads as usize),
+        force: running.force,
+        only: chosen,
+        interrupt,
+    };
+    let outcome = {
+        let mut display = progress::display(running.quiet);
+        run_plan(plan, &options, display.as_mut())
+    };
+    let outcome = outcome.map_err(|error| wrong(&error.to_string()))?;
+    repeat_warnings(&outcome);
+    if outcome.interrupted {
+        let missing = plan.jobs.len() - outcome.finished.len();
+        eprintln!(
+            "interrupted: {} of {} jobs are finished and kept; the same command computes the other {missing}",
+            outcome.finished.len(),
+            plan.jobs.len()
+        );
+        return Ok(Done {
+            exit: Exit::Interrupted,
+            rows: Vec::new(),
+            written: None,
+        });
+    }
+    let exit = verdict(plan, &outcome.finished);
+    if !running.quiet {
+        say(&summary(plan, &outcome.finished));
+    }
+    let rows = rows(plan, &store, outcome.finished);
+    let written = write_report(&plan.experiment, &rows, &running.results, running.quiet)?;
+    Ok(Done {
+        exit,
+        rows,
+        written: Some(written),
+    })
+}
+
+/// The jobs whose names are asked for; all when none are.
+fn choose(plan: &Plan, only: &[String]) -> Result<Option<Vec<usize>>, Exit> {
+    if only.is_empty() {
+        return Ok(None);
+    }
+    let mut chosen = Vec::new();
+    for part in only {
+        let before = chosen.len();
+        let named = plan.jobs.iter().enumerate().filter(|(_, job)| job.name.contains(part));
+        chosen.extend(named.map(|(index, _)| index));
+        if chosen.len() == before {
+            let names = plan.jobs.iter().map(|job| job.name.as_str());
+            let help = suggestion(part, names).unwrap_or_else(|| "`vargeo plan FILE` lists the jobs".into());
+            return Err(wrong(&format!("no job's name contains \"{part}\"\nhelp: {help}")));
+        }
+    }
+    chosen.sort_unstable();
+    chosen.dedup();
+    Ok(Some(chosen))
+}
+
+fn wrong(message: &str) -> Exit {
+    eprintln!("error: {message}");
+    Exit::FileWrong
+}
+
+/// Prints a line; a reader who has gone away is no reason to stop computing.
+fn say(text: &str) {
+    let _ = writeln!(std::io::stdout(), "{text}");
+}
+
+/// Warnings scroll away during a run; those on wrong results are worth a second telling.
+fn repeat_warnings(outcome: &Run) {
+    let grave: Vec<&String> = outcome
+        .warnings
+        .iter()
+        .filter(|warning| warning.contains("not deterministic"))
+        .collect();
+    if !grave.is_empty() {
+        eprintln!("warning: {} jobs are NOT DETERMINISTIC:", grave.len());
+        grave.iter().for_each(|warning| eprintln!("  {warning}"));
+    }
+}
+
+/// Whether a job ended as an expectation of the file says it must.
+fn is_expected(plan: &Plan, finished: &Finished) -> bool {
+    let axes = &plan.jobs[finished.index].axes;
+    plan.experiment.expectations.iter().any(|expectation| {
+        expectation.stop.as_ref() == Some(&finished.record.result.stop) && grid::matches(&expectation.condition, axes)
+    })
+}
+
+fn failed(record: &Record) -> bool {
+    matches!(record.result.status, Status::Failed | Status::Refused)
+}
+
+/// The exit code that the records ask for: a failure that is expected is none.
+fn verdict(plan: &Plan, finished: &[Finished]) -> Exit {
+    let mut computed = finished
+        .iter()
+        .filter(|finished| finished.record.result.status != Status::Skipped);
+    if finished
+        .iter()
+        .any(|finished| failed(&finished.record) && !is_expected(plan, finished))
+    {
+        Exit::JobFailed
+    } else if computed.next().is_none() {
+        Exit::NothingRan
+    } else {
+        Exit::Well
+    }
+}
+
+fn summary(plan: &Plan, finished: &[Finished]) -> String {
+    let count = |test: &dyn Fn(&Finished) -> bool| finished.iter().filter(|finished| test(finished)).count();
+    let status = |finished: &Finished| finished.record.result.status;
+    let parts = [
+        (
+            count(&|job| !job.cached && !failed(&job.record) && status(job) != Status::Skipped),
+            "computed",
+        ),
+        (count(&|job| job.cached), "from the store"),
+        (count(&|job| !job.cached && failed(&job.record)), "failed"),
+        (count(&|job| status(job) == Status::Skipped), "skipped"),
+        (plan.jobs.len() - finished.len(), "not asked for"),
+    ];
+    let parts: Vec<String> = parts
+        .iter()
+        .filter(|(count, _)| *count > 0)
+        .map(|(count, word)| format!("{count} {word}"))
+        .collect();
+    format!("{}\n", parts.join(", "))
+}
+
+/// The records as the report wants them, with the result meshes from the store.
+pub(super) fn rows(plan: &Plan, store: &Store, finished: Vec<Finished>) -> Vec<Row> {
+    let row = |finished: Finished| {
+        let job = &plan.jobs[finished.index];
+        let record = finished.record;
+        let mesh = record.result.artifacts.contains_key(MESH);
+        let mesh = mesh.then(|| std::fs::read(store.entry(&record.key).join(MESH)));
+        let mesh = mesh.and_then(|read| {
+            read.map_err(|error| eprintln!("warning: {}: the result mesh cannot be read: {error}", job.name))
+                .ok()
+        });
+        Row {
+            name: job.name.clone(),
+            axes: job.axes.clone(),
+            record,
+            cached: finished.cached,
+            mesh,
+        }
+    };
+    finished.into_iter().map(row).collect()
+}
+
+/// Writes `results/<experiment>/` and prints the tables.
+pub(super) fn write_report(
+    experiment: &Experiment,
+    rows: &[Row],
+    results: &Path,
+    quiet: bool,
+) -> Result<report::Written, Exit> {
+    let folder = results.join(&experiment.name);
+    let written = report::write(experiment, rows, &folder).map_err(|error| wrong(&error.to_string()))?;
+    if !quiet {
+        say(&report::terminal(experiment, rows, None));
+        say(&format!("page: {}", written.page.display()));
+    }
+    Ok(written)
+}

@@ -1,0 +1,141 @@
+//! `vargeo store`: verify it, count it, tidy it.
+
+use super::Exit;
+use crate::experiment::job::Key;
+use crate::run::store::{Garbage, GarbageKind, Store};
+use indicatif::HumanBytes;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::PathBuf;
+use std::time::Duration;
+
+/// Verifies, counts and tidies the store of results.
+#[derive(clap::Args)]
+pub struct Arguments {
+    #[command(subcommand)]
+    action: Action,
+}
+
+#[derive(clap::Subcommand)]
+enum Action {
+    /// Reads every byte of every result; damaged ones are moved to the store's quarantine.
+    Verify(Place),
+    /// Says what is there.
+    Stat(Place),
+    /// Lists what nobody needs, and removes it with --delete.
+    Gc(Tidy),
+}
+
+#[derive(clap::Args)]
+struct Place {
+    /// Folder of results; the store is in its folder `store`.
+    #[arg(long, value_name = "DIR", default_value = "results")]
+    results: PathBuf,
+}
+
+#[derive(clap::Args)]
+struct Tidy {
+    #[command(flatten)]
+    place: Place,
+    /// Remove, rather than only list.
+    #[arg(long)]
+    delete: bool,
+    /// Hours for which unfinished writes are left alone, since another process may be at work on them.
+    #[arg(long, value_name = "HOURS", default_value_t = 24)]
+    older: u64,
+}
+
+/// Does what is asked.
+pub fn execute(arguments: Arguments) -> Exit {
+    let done = match arguments.action {
+        Action::Verify(place) => verify(&place),
+        Action::Stat(place) => statistics(&place),
+        Action::Gc(tidy) => collect(&tidy),
+    };
+    done.unwrap_or_else(|error| {
+        eprintln!("error: {error}");
+        Exit::FileWrong
+    })
+}
+
+type Done = Result<Exit, Box<dyn std::error::Error>>;
+
+/// The store of a results folder, which must be there.
+fn open(place: &Place) -> Result<Store, String> {
+    let root = place.results.join("store");
+    if !root.is_dir() {
+        return Err(format!(
+            "there is no store at {}; --results names the folder of results",
+            root.display()
+        ));
+    }
+    Ok(Store::new(root))
+}
+
+fn verify(place: &Place) -> Done {
+    let (sound, damaged) = open(place)?.verify()?;
+    println!("{sound} results are sound, {} are damaged", damaged.len());
+    for damage in &damaged {
+        println!("{}: {}", damage.key.0, damage.reason);
+        match &damage.quarantine {
+            Ok(path) => println!("  moved to {}; the next run computes it again", path.display()),
+            Err(error) => println!("  {error}"),
+        }
+    }
+    Ok(if damaged.is_empty() {
+        Exit::Well
+    } else {
+        Exit::ExpectationFailed
+    })
+}
+
+fn statistics(place: &Place) -> Done {
+    let statistics = open(place)?.statistics()?;
+    println!("{} results, {}", statistics.entries, HumanBytes(statistics.bytes));
+    for (kind, count) in &statistics.kinds {
+        println!("  {count} {kind}");
+    }
+    println!("{} failures, tried again by the next run", statistics.failures);
+    println!(
+        "{} in quarantine, {}",
+        statistics.quarantined,
+        HumanBytes(statistics.quarantined_bytes)
+    );
+    println!(
+        "{} unfinished, {}",
+        statistics.leftovers,
+        HumanBytes(statistics.leftover_bytes)
+    );
+    Ok(Exit::Well)
+}
+
+fn collect(tidy: &Tidy) -> Done {
+    let store = open(&tidy.place)?;
+    let keep: Option<BTreeSet<Key>> = None;
+    let age = Duration::from_secs(tidy.older.saturating_mul(3600));
+    let garbage = store.garbage(age, keep.as_ref())?;
+    let mut sums: BTreeMap<GarbageKind, (usize, u64)> = BTreeMap::new();
+    for Garbage { kind, path, bytes } in &garbage {
+        println!("{}", path.display());
+        let sum = sums.entry(*kind).or_default();
+        *sum = (sum.0 + 1, sum.1 + bytes);
+    }
+    for (kind, (count, bytes)) in sums {
+        let word = match kind {
+            GarbageKind::Leftover => "unfinished writes",
+            GarbageKind::Quarantined => "in quarantine",
+            GarbageKind::Unreferenced => "results of no given experiment",
+            GarbageKind::Failure => "failures of no given experiment",
+            GarbageKind::Lock => "idle locks",
+        };
+        println!("{count} {word}, {}", HumanBytes(bytes));
+    }
+    match (garbage.is_empty(), tidy.delete) {
+        (true, _) => println!("nothing to remove"),
+        (false, true) => {
+            store.remove(&garbage)?;
+            println!("removed");
+        }
+        (false, false) => println!("nothing was removed; --delete does it"),
+    }
+    Ok(Exit::Well)
+}

@@ -1,0 +1,168 @@
+//! A TOML document as a tree in which every key and value knows its bytes in the file, in the order of the file.
+
+use super::diagnostic::{Diagnostic, Source};
+use std::ops::Range;
+use std::sync::Arc;
+use toml::de::{DeArray, DeTable, DeValue};
+
+/// A value with its place.
+#[derive(Clone, Debug)]
+pub struct Node {
+    pub span: Range<usize>,
+    pub content: Content,
+}
+
+/// What a value holds.
+#[derive(Clone, Debug)]
+pub enum Content {
+    Text(String),
+    Integer(i64),
+    Number(f64),
+    Boolean(bool),
+    /// Dates have no meaning in an experiment file; kept for the message.
+    Date,
+    List(Vec<Node>),
+    Table(Table),
+}
+
+/// Entries in the order of the file.
+#[derive(Clone, Debug, Default)]
+pub struct Table {
+    pub entries: Vec<Entry>,
+}
+
+/// A key and its value.
+#[derive(Clone, Debug)]
+pub struct Entry {
+    pub key: String,
+    pub key_span: Range<usize>,
+    pub value: Node,
+}
+
+impl Table {
+    pub fn get(&self, key: &str) -> Option<&Entry> {
+        self.entries.iter().find(|entry| entry.key == key)
+    }
+}
+
+impl Content {
+    /// What it is, for `"tetrahedra" is text`.
+    pub fn describe(&self) -> &'static str {
+        match self {
+            Content::Text(_) => "text",
+            Content::Integer(_) => "a whole number",
+            Content::Number(_) => "a number",
+            Content::Boolean(_) => "true or false",
+            Content::Date => "a date",
+            Content::List(_) => "a list",
+            Content::Table(_) => "a table",
+        }
+    }
+}
+
+/// Reads TOML; every syntax error that can be told apart from its consequences is reported.
+pub fn parse(source: &Arc<Source>) -> Result<Table, Vec<Diagnostic>> {
+    let (table, errors) = DeTable::parse_recoverable(&source.text);
+    if !errors.is_empty() {
+        return Err(syntax_errors(source, &errors));
+    }
+    let mut diagnostics = Vec::new();
+    let table = convert_table(table.get_ref(), source, &mut diagnostics);
+    if diagnostics.is_empty() {
+        Ok(table)
+    } else {
+        Err(diagnostics)
+    }
+}
+
+/// One error a line; within an unclosed list only the first, since the rest follow from it.
+fn syntax_errors(source: &Arc<Source>, errors: &[toml::de::Error]) -> Vec<Diagnostic> {
+    let runaway = errors.iter().any(|error| error.message().contains("unclosed"));
+    let mut lines = std::collections::BTreeSet::new();
+    let mut found = Vec::new();
+    for error in errors {
+        let span = error.span().unwrap_or(0..0);
+        let (message, expected) = error.message().split_once(", ").unwrap_or((error.message(), ""));
+        let mut diagnostic = Diagnostic::error(message).label(expected).at(source, span);
+        if runaway {
+            diagnostic = diagnostic.help("a list, table or text that begins on this line or above may lack its end");
+        } else if message == "duplicate key" {
+            diagnostic = diagnostic.help("a key or table may stand only once; join the two or remove one");
+        }
+        let line = diagnostic.place.as_ref().map_or(0, super::diagnostic::Place::line);
+        if lines.insert(line) {
+            found.push((line, diagnostic));
+        }
+        if runaway {
+            break;
+        }
+    }
+    found.sort_by_key(|(line, _)| *line);
+    found.into_iter().map(|(_, diagnostic)| diagnostic).collect()
+}
+
+fn convert_table(table: &DeTable<'_>, source: &Arc<Source>, diagnostics: &mut Vec<Diagnostic>) -> Table {
+    let mut entries: Vec<Entry> = table
+        .iter()
+        .map(|(key, value)| Entry {
+            key: key.get_ref().to_string(),
+            key_span: key.span(),
+            value: convert(value.get_ref(), value.span(), source, diagnostics),
+        })
+        .collect();
+    entries.sort_by_key(|entry| entry.key_span.start);
+    Table { entries }
+}
+
+fn convert(value: &DeValue<'_>, span: Range<usize>, source: &Arc<Source>, diagnostics: &mut Vec<Diagnostic>) -> Node {
+    let content = match value {
+        DeValue::String(text) => Content::Text(text.to_string()),
+        DeValue::Boolean(value) => Content::Boolean(*value),
+        DeValue::Datetime(_) => Content::Date,
+        DeValue::Integer(digits) => match i64::from_str_radix(digits.as_str(), digits.radix()) {
+            Ok(value) => Content::Integer(value),
+            Err(_) => {
+                diagnostics.push(
+                    Diagnostic::error(format!("whole number {digits} is too large"))
+                        .label("expected at most 9223372036854775807 in magnitude")
+                        .at(source, span.clone()),
+                );
+                Content::Integer(0)
+            }
+        },
+        DeValue::Float(digits) => match digits.as_str().parse() {
+            Ok(value) => Content::Number(value),
+            Err(_) => {
+                diagnostics.push(Diagnostic::error(format!("{digits} is not a number")).at(source, span.clone()));
+                Content::Number(0.0)
+            }
+        },
+        DeValue::Array(items) => Content::List(convert_list(items, source, diagnostics)),
+        DeValue::Table(table) => Content::Table(convert_table(table, source, diagnostics)),
+    };
+    Node { span, content }
+}
+
+fn convert_list(items: &DeArray<'_>, source: &Arc<Source>, diagnostics: &mut Vec<Diagnostic>) -> Vec<Node> {
+    items
+        .iter()
+        .map(|item| convert(item.get_ref(), item.span(), source, diagnostics))
+        .collect()
+}
+
+/// Text as a basic string of TOML.
+pub fn quote(text: &str) -> String {
+    let mut quoted = String::from("\"");
+    for character in text.chars() {
+        match character {
+            '"' | '\\' => {
+                quoted.push('\\');
+                quoted.push(character);
+            }
+            control if control.is_control() => quoted.push_str(&format!("\\u{:04X}", control as u32)),
+            other => quoted.push(other),
+        }
+    }
+    quoted.push('"');
+    quoted
+}

@@ -1,0 +1,646 @@
+//! Validation of meshes before use, repair of reversed tetrahedra, and a summary for the reader.
+//!
+//! Guarantees: after [`tetrahedra`] without a [`Severity::Error`], every index is in range, every coordinate finite, every
+//! vertex used, every tetrahedron positive, no two are equal, a face has at most two tetrahedra, and these lie on its two
+//! sides. Does not guarantee: that distant parts of the mesh do not intersect each other.
+
+use super::connectivity::{self, Boundary, CROWDED, Facets, Surface, TETRAHEDRON_FACETS};
+use super::quality::{self, Spread, scaled_jacobian};
+use super::{Mesh, TetrahedralMesh, TriangleMesh, area_vector, bounding_box, determinant, length, subtract};
+
+/// What a problem means for a computation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Severity {
+    /// The mesh cannot be used.
+    Error,
+    /// The mesh can be used; the reader should know.
+    Warning,
+    /// Was a problem and is repaired.
+    Repaired,
+}
+
+/// What [`Problem::first`] counts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Element {
+    /// The mesh as a whole; `first` is 0.
+    Mesh,
+    Vertex,
+    Cell,
+}
+
+/// One kind of problem of a mesh.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Problem {
+    /// Kebab-case, such as `degenerate-cell`.
+    pub kind: &'static str,
+    pub severity: Severity,
+    /// How many vertices or cells have it.
+    pub count: usize,
+    pub element: Element,
+    /// Index of the first offender, from 0.
+    pub first: usize,
+    /// What is wrong, where, and the mend.
+    pub message: String,
+}
+
+/// The problems found so far.
+#[derive(Default)]
+struct Problems(Vec<Problem>);
+
+impl Problems {
+    /// Adds a problem when `offenders` has any; `describe` gets their number and the first.
+    fn add(
+        &mut self,
+        kind: &'static str,
+        severity: Severity,
+        element: Element,
+        offenders: impl Iterator<Item = usize>,
+        describe: impl FnOnce(usize, usize) -> String,
+    ) -> bool {
+        let mut offenders = offenders.peekable();
+        let Some(&first) = offenders.peek() else { return false };
+        let count = offenders.count();
+        self.0.push(Problem {
+            kind,
+            severity,
+            count,
+            element,
+            first,
+            message: describe(count, first),
+        });
+        true
+    }
+}
+
+/// `"1 tetrahedron"`, `"3 tetrahedra"`.
+fn counted(count: usize, one: &str, many: &str) -> String {
+    format!("{count} {}", if count == 1 { one } else { many })
+}
+
+/// Names of a kind of cell: singular, plural.
+fn names<const N: usize>() -> (&'static str, &'static str) {
+    if N == 4 {
+        ("tetrahedron", "tetrahedra")
+    } else {
+        ("triangle", "triangles")
+    }
+}
+
+/// The checks that need no connectivity, in an order in which each may rely on those before. Returns whether cells and
+/// coordinates can be used further.
+fn elementary<const N: usize>(mesh: &Mesh<N>, problems: &mut Problems) -> bool {
+    let (one, many) = names::<N>();
+    let (vertices, cells) = (mesh.points.len(), mesh.cells.len());
+    if cells == 0 {
+        problems.add("empty", Severity::Error, Element::Mesh, std::iter::once(0), |_, _| {
+            format!("the mesh has {vertices} vertices but no {many}; check that the file holds {many}")
+        });
+        return false;
+    }
+    if vertices >= CROWDED as usize || cells > u32::MAX as usize / N {
+        problems.add(
+            "too-large",
+            Severity::Error,
+            Element::Mesh,
+            std::iter::once(0),
+            |_, _| format!("the mesh has {vertices} vertices and {cells} {many}; use one of fewer than a billion"),
+        );
+        return false;
+    }
+    let infinite = (0..vertices).filter(|&vertex| !mesh.points[vertex].iter().all(|c| c.is_finite()));
+    let infinite = problems.add(
+        "not-finite",
+        Severity::Error,
+        Element::Vertex,
+        infinite,
+        |count, first| {
+            format!(
+                "{} a coordinate that is not finite, the first is vertex {first}; repair or remove them",
+                counted(count, "vertex has", "vertices have")
+            )
+        },
+    );
+    let beyond = (0..cells).filter(|&cell| mesh.cells[cell].iter().any(|&vertex| vertex as usize >= vertices));
+    let beyond = problems.add("index-out-of-range", Severity::Error, Element::Cell, beyond, |count, first| {
+        format!(
+            "{count} of {cells} {many} name a vertex that does not exist, the first is {one} {first} with vertices {:?} \
+             of {vertices} (counted from 0); is the file truncated or its vertices counted from another number?",
+            mesh.cells[first]
+        )
+    });
+    let repeats = |cell: &[u32; N]| (1..N).any(|i| cell[..i].contains(&cell[i]));
+    let repeated = (0..cells).filter(|&cell| repeats(&mesh.cells[cell]));
+    let repeated = problems.add("repeated-vertex", Severity::Error, Element::Cell, repeated, |count, first| {
+        format!(
+            "{count} of {cells} {many} use a vertex twice, the first is {one} {first} with vertices {:?}; remove them",
+            mesh.cells[first]
+        )
+    });
+    if infinite || beyond {
+        return false;
+    }
+    let mut used = vec![false; vertices];
+    for &vertex in mesh.cells.iter().flatten() {
+        used[vertex as usize] = true;
+    }
+    let unused = (0..vertices).filter(|&vertex| !used[vertex]);
+    problems.add(
+        "unreferenced-vertex",
+        Severity::Error,
+        Element::Vertex,
+        unused,
+        |count, first| {
+            format!(
+                "{} to no {one}, the first is vertex {first}; remove such vertices from the file",
+                counted(count, "vertex belongs", "vertices belong")
+            )
+        },
+    );
+    let mut sorted: Vec<([u32; N], u32)> = mesh
+        .cells
+        .iter()
+        .zip(0..)
+        .map(|(&cell, index)| {
+            let mut cell = cell;
+            cell.sort_unstable();
+            (cell, index)
+        })
+        .collect();
+    sorted.sort_unstable();
+    let mut copies: Vec<usize> = sorted
+        .windows(2)
+        .filter(|pair| pair[0].0 == pair[1].0)
+        .map(|pair| pair[1].1 as usize)
+        .collect();
+    copies.sort_unstable();
+    let copied = problems.add(
+        "duplicate-cell",
+        Severity::Error,
+        Element::Cell,
+        copies.into_iter(),
+        |count, first| {
+            format!(
+                "{} the vertices of an earlier one, the first is {one} {first} with vertices {:?}; remove the copies",
+                counted(count, &format!("{one} has"), &format!("{many} have")),
+                mesh.cells[first]
+            )
+        },
+    );
+    drop(sorted);
+    let mut order: Vec<u32> = (0..vertices as u32).collect();
+    let key = |vertex: u32| mesh.points[vertex as usize].map(|coordinate| coordinate + 0.0);
+    let compare = |a: [f64; 3], b: [f64; 3]| {
+        (0..3)
+            .map(|axis| a[axis].total_cmp(&b[axis]))
+            .find(|order| order.is_ne())
+            .unwrap_or(std::cmp::Ordering::Equal)
+    };
+    order.sort_unstable_by(|&a, &b| compare(key(a), key(b)).then(a.cmp(&b)));
+    let mut twins: Vec<usize> = order
+        .windows(2)
+        .filter(|pair| key(pair[0]) == key(pair[1]))
+        .map(|pair| pair[1] as usize)
+        .collect();
+    twins.sort_unstable();
+    problems.add("coincident-vertices", Severity::Warning, Element::Vertex, twins.into_iter(), |count, first| {
+        format!(
+            "{} at the place of an earlier one, the first is vertex {first}; the mesh is cut apart there unless they are \
+             merged",
+            counted(count, "vertex lies", "vertices lie")
+        )
+    });
+    !repeated && !copied
+}
+
+/// A volume below this multiple of the cube of the longest edge (an area below this multiple of its square) counts as
+/// zero: the rounding of the coordinates alone produces as much.
+const FLAT: f64 = 1e-15;
+
+/// The longest distance between two of the points.
+fn longest<const N: usize>(corners: [[f64; 3]; N]) -> f64 {
+    let mut longest = 0.0f64;
+    for (index, &a) in corners.iter().enumerate() {
+        for &b in &corners[..index] {
+            longest = longest.max(length(subtract(a, b)));
+        }
+    }
+    longest
+}
+
+/// Whether the neighbours across facet `local` of `cell` lie on its two sides, by the order of their vertices.
+fn opposed(cells: &[[u32; 4]], cell: usize, local: usize, neighbour: usize) -> bool {
+    let ours = TETRAHEDRON_FACETS[local].map(|corner| cells[cell][corner]);
+    let other = &cells[neighbour];
+    let Some(apex) = other.iter().position(|vertex| !ours.contains(vertex)) else {
+        return false;
+    };
+    let theirs = TETRAHEDRON_FACETS[apex].map(|corner| other[corner]);
+    // Seen from its own cell each face turns the same way; seen from one side they must turn opposite ways.
+    let Some(start) = theirs.iter().position(|&vertex| vertex == ours[0]) else {
+        return false;
+    };
+    theirs[(start + 1) % 3] == ours[2]
+}
+
+/// Cells that lie on the same side of a face as a neighbour, ascending.
+fn folded(cells: &[[u32; 4]], facets: &Facets<4>) -> Vec<usize> {
+    (0..cells.len())
+        .filter(|&cell| {
+            facets.neighbours[cell].iter().enumerate().any(|(local, &neighbour)| {
+                neighbour < CROWDED && (neighbour as usize) < cell && !opposed(cells, cell, local, neighbour as usize)
+            })
+        })
+        .collect()
+}
+
+/// Checks a tetrahedral mesh and turns reversed tetrahedra round by exchanging their last two vertices. Errors come
+/// first in the list.
+pub fn tetrahedra(mesh: &mut TetrahedralMesh) -> Vec<Problem> {
+    let mut problems = Problems::default();
+    if elementary(mesh, &mut problems) {
+        shape_and_orientation(mesh, &mut problems);
+    }
+    let mut problems = problems.0;
+    problems.sort_by_key(|problem| problem.severity);
+    problems
+}
+
+/// The checks of [`tetrahedra`] that rely on sound cells.
+fn shape_and_orientation(mesh: &mut TetrahedralMesh, problems: &mut Problems) {
+    let (vertices, total) = (mesh.points.len(), mesh.cells.len());
+    let determinants: Vec<f64> = mesh.cells.iter().map(|&cell| determinant(mesh.corners(cell))).collect();
+    let flat = |cell: usize| determinants[cell].abs() / 6.0 <= FLAT * longest(mesh.corners(mesh.cells[cell])).powi(3);
+    let flat: Vec<usize> = (0..total).filter(|&cell| flat(cell)).collect();
+    let degenerate = !flat.is_empty();
+    problems.add("degenerate-cell", Severity::Error, Element::Cell, flat.into_iter(), |count, first| {
+        format!(
+            "{count} of {total} tetrahedra have no volume, the first is tetrahedron {first} with vertices {:?}; remove \
+             or remesh them",
+            mesh.cells[first]
+        )
+    });
+    let mut facets = connectivity::facets(&mesh.cells, vertices);
+    if facets.crowded > 0 {
+        let first = facets.first_crowded as usize;
+        problems.0.push(Problem {
+            kind: "non-manifold-face",
+            severity: Severity::Error,
+            count: facets.crowded,
+            element: Element::Cell,
+            first,
+            message: format!(
+                "{} more than two tetrahedra, the first at tetrahedron {first}; remove the surplus tetrahedra",
+                counted(facets.crowded, "face has", "faces have")
+            ),
+        });
+    }
+    let negative: Vec<usize> = (0..total).filter(|&cell| determinants[cell] < 0.0).collect();
+    let turn = |mesh: &mut TetrahedralMesh, facets: &mut Facets<4>| {
+        for &cell in &negative {
+            mesh.cells[cell].swap(2, 3);
+            facets.neighbours[cell].swap(2, 3);
+        }
+    };
+    turn(mesh, &mut facets);
+    let folded = folded(&mesh.cells, &facets);
+    if folded.is_empty() {
+        let reversed = negative.iter().copied();
+        problems.add(
+            "reversed",
+            Severity::Repaired,
+            Element::Cell,
+            reversed,
+            |count, first| {
+                if count == total {
+                    format!("all {total} tetrahedra were listed with reversed orientation; turned round")
+                } else {
+                    format!(
+                        "{count} of {total} tetrahedra were listed with reversed orientation, the first is tetrahedron \
+                     {first}; turned round"
+                    )
+                }
+            },
+        );
+    } else if !degenerate {
+        // The order of the vertices was sound and the positions are not: leave the cells as they are.
+        let before = negative.len();
+        let (count, first) = (folded.len(), folded[0]);
+        turn(mesh, &mut facets);
+        // A mesh that is reversed as a whole shows its few positive tetrahedra as the inverted ones.
+        let inverted = before.min(total - before);
+        let reversed = before > total - before;
+        let first = (0..total)
+            .find(|&cell| (determinants[cell] < 0.0) != reversed)
+            .unwrap_or(first);
+        let (kind, message) = if inverted == 0 {
+            (
+                "overlap",
+                format!(
+                    "{count} of {total} tetrahedra overlap a neighbour, the first is tetrahedron {first}; \
+                                 remesh these places"
+                ),
+            )
+        } else {
+            (
+                "inverted",
+                format!(
+                    "{inverted} of {total} tetrahedra are turned inside out by the positions of their vertices, the first is \
+                 tetrahedron {first} with vertices {:?}; remesh or untangle these places",
+                    mesh.cells[first]
+                ),
+            )
+        };
+        problems.add(kind, Severity::Error, Element::Cell, std::iter::once(first), |_, _| {
+            message
+        });
+        if let Some(problem) = problems.0.last_mut() {
+            problem.count = if inverted == 0 { count } else { inverted };
+        }
+    }
+    let parts = connectivity::components(&mesh.cells, vertices).count;
+    if parts > 1 {
+        problems.add(
+            "several-components",
+            Severity::Warning,
+            Element::Mesh,
+            std::iter::once(0),
+            |_, _| format!("the mesh has {parts} separate parts; a target shape needs a single one"),
+        );
+    }
+    let pinched = connectivity::pinched_vertices(&mesh.cells, vertices, &facets);
+    let pinched = pinched.iter().map(|&vertex| vertex as usize);
+    problems.add("pinched-vertex", Severity::Warning, Element::Vertex, pinched, |count, first| {
+        format!(
+            "{} parts of the mesh that share no face there, the first is vertex {first}; the boundary is no manifold",
+            counted(count, "vertex joins", "vertices join")
+        )
+    });
+    let poor = (0..total).filter(|&cell| {
+        let shape = scaled_jacobian(mesh.corners(mesh.cells[cell]));
+        shape > 0.0 && shape < 1e-3
+    });
+    let poor: Vec<usize> = poor.collect();
+    problems.add(
+        "poor-cell",
+        Severity::Warning,
+        Element::Cell,
+        poor.into_iter(),
+        |count, first| {
+            format!(
+                "{count} of {total} tetrahedra are nearly flat (scaled Jacobian below 0.001), the first is tetrahedron \
+             {first}; distortions and times suffer"
+            )
+        },
+    );
+}
+
+/// Checks a tetrahedral mesh for use in a computation: returns it with its reversed tetrahedra turned round, and notices
+/// for the reader.
+///
+/// # Errors
+/// All errors of [`tetrahedra`], one a line.
+pub fn usable(mut mesh: TetrahedralMesh) -> Result<(TetrahedralMesh, Vec<String>), String> {
+    let problems = tetrahedra(&mut mesh);
+    let of = |error: bool| {
+        problems
+            .iter()
+            .filter(move |problem| (problem.severity == Severity::Error) == error)
+            .map(|p| p.message.clone())
+    };
+    let errors: Vec<String> = of(true).collect();
+    if errors.is_empty() {
+        Ok((mesh, of(false).collect()))
+    } else {
+        Err(errors.join("\n"))
+    }
+}
+
+/// Checks a triangle surface. Open boundaries and separate parts are no problems; they are in the summary. Errors come
+/// first in the list.
+pub fn triangles(mesh: &TriangleMesh) -> Vec<Problem> {
+    let mut problems = Problems::default();
+    if elementary(mesh, &mut problems) {
+        let total = mesh.cells.len();
+        let flat = |&cell: &usize| {
+            let corners = mesh.corners(mesh.cells[cell]);
+            length(area_vector(corners)) / 2.0 <= FLAT * longest(corners).powi(2)
+        };
+        problems.add("degenerate-cell", Severity::Error, Element::Cell, (0..total).filter(flat), |count, first| {
+            format!(
+                "{count} of {total} triangles have no area, the first is triangle {first} with vertices {:?}; remove or \
+                 remesh them",
+                mesh.cells[first]
+            )
+        });
+        let topology = connectivity::surface_topology(&mesh.cells, mesh.points.len());
+        if topology.crowded_edges > 0 {
+            problems.0.push(Problem {
+                kind: "non-manifold-edge",
+                severity: Severity::Warning,
+                count: topology.crowded_edges,
+                element: Element::Cell,
+                first: topology.first_crowded as usize,
+                message: format!(
+                    "{} more than two triangles, the first at triangle {}; split or remove the surplus triangles",
+                    counted(topology.crowded_edges, "edge has", "edges have"),
+                    topology.first_crowded
+                ),
+            });
+        }
+        let pinched = topology.pinched.iter().map(|&vertex| vertex as usize);
+        problems.add("pinched-vertex", Severity::Warning, Element::Vertex, pinched, |count, first| {
+            format!(
+                "{} parts of the surface that share no edge there, the first is vertex {first}; duplicate such vertices",
+                counted(count, "vertex joins", "vertices join")
+            )
+        });
+        let disoriented = topology.disoriented.iter().map(|&cell| cell as usize);
+        problems.add(
+            "inconsistent-orientation",
+            Severity::Warning,
+            Element::Cell,
+            disoriented,
+            |count, first| {
+                format!(
+                    "{} to a neighbour, the first is triangle {first}; turn one of each pair round",
+                    counted(
+                        count,
+                        "triangle is oriented opposite",
+                        "triangles are oriented opposite"
+                    )
+                )
+            },
+        );
+    }
+    let mut problems = problems.0;
+    problems.sort_by_key(|problem| problem.severity);
+    problems
+}
+
+/// What there is to say about a mesh.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Summary {
+    /// 3 for triangles, 4 for tetrahedra.
+    pub corners: usize,
+    pub vertices: usize,
+    pub edges: usize,
+    pub cells: usize,
+    /// Lower and upper corner.
+    pub bounding_box: [[f64; 3]; 2],
+    /// Volume of tetrahedra; area of triangles.
+    pub measure: f64,
+    /// Area of the boundary of tetrahedra; the volume inside a closed surface.
+    pub second_measure: Option<f64>,
+    /// Parts that share no vertex.
+    pub components: usize,
+    pub boundary_vertices: usize,
+    /// Boundary triangles of tetrahedra; boundary edges of triangles.
+    pub boundary_facets: usize,
+    /// The components of the boundary of tetrahedra; of the surface itself for triangles.
+    pub surfaces: Vec<Surface>,
+    /// Interior edges that join two boundary vertices; zero for triangles.
+    pub boundary_chords: usize,
+    /// Tetrahedra with four boundary vertices; zero for triangles.
+    pub boundary_cells: usize,
+    /// Of tetrahedra only.
+    pub scaled_jacobian: Option<Spread>,
+    /// Dihedral angles of tetrahedra, angles of triangles, in degrees.
+    pub angles: Option<Spread>,
+    pub edge_length: Option<Spread>,
+}
+
+/// Sums up a mesh that has no [`Severity::Error`], or at least sound indices and coordinates; `None` without points.
+pub fn summarize_tetrahedra(mesh: &TetrahedralMesh) -> Option<Summary> {
+    let vertices = mesh.points.len();
+    let boundary: Boundary = connectivity::boundary(&mesh.cells, vertices);
+    let surface = TriangleMesh {
+        points: mesh.points.clone(),
+        cells: boundary.triangles.clone(),
+    };
+    Some(Summary {
+        corners: 4,
+        vertices,
+        edges: connectivity::edges(&mesh.cells, vertices).len(),
+        cells: mesh.cells.len(),
+        bounding_box: bounding_box(&mesh.points)?,
+        measure: mesh.volume(),
+        second_measure: Some(surface.area()),
+        components: connectivity::components(&mesh.cells, vertices).count,
+        boundary_vertices: boundary.vertices.len(),
+        boundary_facets: boundary.triangles.len(),
+        surfaces: connectivity::surface_topology(&surface.cells, vertices).components,
+        boundary_chords: super::split::boundary_chords(mesh, &boundary).len(),
+        boundary_cells: super::split::boundary_cells(mesh, &boundary).len(),
+        scaled_jacobian: quality::scaled_jacobians(mesh),
+        angles: quality::all_dihedral_angles(mesh),
+        edge_length: quality::edge_lengths(mesh),
+    })
+}
+
+/// As [`summarize_tetrahedra`], for triangles.
+pub fn summarize_triangles(mesh: &TriangleMesh) -> Option<Summary> {
+    let vertices = mesh.points.len();
+    let topology = connectivity::surface_topology(&mesh.cells, vertices);
+    let closed = topology.boundary_edges == 0 && topology.components.iter().all(|part| part.genus.is_some());
+    Some(Summary {
+        corners: 3,
+        vertices,
+        edges: topology.components.iter().map(|part| part.edges).sum(),
+        cells: mesh.cells.len(),
+        bounding_box: bounding_box(&mesh.points)?,
+        measure: mesh.area(),
+        second_measure: closed.then(|| mesh.enclosed_volume()),
+        components: topology.components.len(),
+        boundary_vertices: topology.boundary_vertices,
+        boundary_facets: topology.boundary_edges,
+        surfaces: topology.components,
+        boundary_chords: 0,
+        boundary_cells: 0,
+        scaled_jacobian: None,
+        angles: quality::triangle_angles(mesh),
+        edge_length: quality::edge_lengths(mesh),
+    })
+}
+
+impl Summary {
+    /// The summary as lines of a label and a value.
+    pub fn rows(&self) -> Vec<(&'static str, String)> {
+        let solid = self.corners == 4;
+        let point = |p: [f64; 3]| format!("({}, {}, {})", number(p[0]), number(p[1]), number(p[2]));
+        let spread = |s: &Option<Spread>| match s {
+            Some(s) => format!("{} to {}, mean {}", number(s.min), number(s.max), number(s.mean)),
+            None => "undefined".to_string(),
+        };
+        let [low, high] = self.bounding_box;
+        let mut rows = vec![
+            ("vertices", self.vertices.to_string()),
+            ("edges", self.edges.to_string()),
+            (if solid { "tetrahedra" } else { "triangles" }, self.cells.to_string()),
+            ("box", format!("{} to {}", point(low), point(high))),
+            (if solid { "volume" } else { "area" }, number(self.measure)),
+        ];
+        if let Some(measure) = self.second_measure {
+            rows.push((if solid { "boundary area" } else { "volume inside" }, number(measure)));
+        }
+        rows.push(("components", self.components.to_string()));
+        let facets = if solid { "triangles" } else { "edges" };
+        rows.push((
+            "boundary",
+            format!("{} vertices, {} {facets}", self.boundary_vertices, self.boundary_facets),
+        ));
+        // Parts beyond the first few would only repeat themselves.
+        let surfaces = self.surfaces.iter().take(5).map(|part| {
+            let genus = part
+                .genus
+                .map_or("no manifold".to_string(), |genus| format!("genus {genus}"));
+            let rim = match part.loops {
+                0 => "closed".to_string(),
+                loops => counted(loops, "boundary loop", "boundary loops"),
+            };
+            format!("{genus}, {rim} ({} triangles)", part.triangles)
+        });
+        let mut surfaces = surfaces.collect::<Vec<_>>().join("; ");
+        if self.surfaces.len() > 5 {
+            surfaces += &format!("; and {} more", self.surfaces.len() - 5);
+        }
+        rows.push((if solid { "boundary surfaces" } else { "surfaces" }, surfaces));
+        if solid {
+            rows.push((
+                "interior edges between boundary vertices",
+                self.boundary_chords.to_string(),
+            ));
+            rows.push((
+                "tetrahedra with boundary vertices only",
+                self.boundary_cells.to_string(),
+            ));
+            rows.push(("scaled Jacobian", spread(&self.scaled_jacobian)));
+        }
+        rows.push((
+            if solid {
+                "dihedral angles (degrees)"
+            } else {
+                "angles (degrees)"
+            },
+            spread(&self.angles),
+        ));
+        rows.push(("edge lengths", spread(&self.edge_length)));
+        rows
+    }
+}
+
+/// A number with six significant digits, without trailing zeros.
+fn number(value: f64) -> String {
+    if value == 0.0 || !value.is_finite() {
+        return if value == 0.0 {
+            "0".to_string()
+        } else {
+            value.to_string()
+        };
+    }
+    let rounded: f64 = format!("{value:.5e}").parse().unwrap_or(value);
+    if (1e-4..1e9).contains(&rounded.abs()) {
+        format!("{rounded}")
+    } else {
+        format!("{rounded:e}")
+    }
+}

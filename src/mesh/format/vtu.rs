@@ -1,0 +1,765 @@
+//! VTU: VTK's unstructured grid in XML, the format of results.
+//!
+//! Read: ASCII, inline base64 and appended (raw or base64) arrays, uncompressed or compressed by zlib, both byte orders, both
+//! header types; one piece. Written: inline base64, little-endian, blocks of 32 KiB compressed by zlib, 64-bit headers, so
+//! that the file is valid XML, every number keeps its bits, and the same content gives the same bytes.
+//! Source: the VTK user's guide, 11th edition, section 19.3, "XML file formats".
+
+use super::binary::{self, Order, Scalar};
+use super::cells::Sorter;
+use super::text::Text;
+use super::{Cells, Content, Fault, Field, Written, vtk};
+use base64::Engine as _;
+use base64::alphabet::STANDARD;
+use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
+use quick_xml::events::{BytesStart, Event};
+use quick_xml::{Reader, XmlVersion};
+use std::cell::Cell;
+use std::fmt::Write as _;
+use std::io::{Read as _, Write as _};
+
+const BASE64: GeneralPurpose = GeneralPurpose::new(
+    &STANDARD,
+    GeneralPurposeConfig::new().with_decode_padding_mode(DecodePaddingMode::Indifferent),
+);
+const BLOCK: usize = 1 << 15;
+/// No stream of deflate grows by more than this factor (RFC 1951: 258 bytes from two bits).
+const MOST_GROWTH: usize = 1040;
+
+/// Whether the bytes start as XML or a VTK XML file does.
+pub(super) fn sniff(bytes: &[u8]) -> bool {
+    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes).trim_ascii_start();
+    bytes.starts_with(b"<?xml") || bytes.starts_with(b"<VTKFile")
+}
+
+/// Where an array belongs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Part {
+    Points,
+    Cells,
+    PointData,
+    CellData,
+}
+
+/// How an array's numbers are written.
+#[derive(Clone, Copy, Debug)]
+enum Form {
+    Ascii,
+    Inline,
+    Appended(usize),
+}
+
+/// An array as its tag describes it.
+#[derive(Debug)]
+struct Array {
+    /// Where the tag stands.
+    at: usize,
+    name: String,
+    part: Part,
+    scalar: Scalar,
+    components: usize,
+    form: Form,
+    /// The text between the tags.
+    start: usize,
+    end: usize,
+}
+
+/// A file whose numbers are still to be decoded.
+struct File<'a> {
+    bytes: &'a [u8],
+    order: Order,
+    header: Scalar,
+    compressed: bool,
+    points: usize,
+    cells: usize,
+    arrays: Vec<Array>,
+    /// Where the appended data start, and whether they are raw.
+    appended: Option<(usize, bool)>,
+    notices: Vec<String>,
+    /// The bytes of all arrays decoded so far, as they stand in the file.
+    decoded: Cell<usize>,
+}
+
+/// Reads a file.
+pub(super) fn read(bytes: &[u8]) -> Result<Content, Fault> {
+    let file = File::parse(bytes)?;
+    let points = read_points(&file)?;
+    let sorter = read_cells(&file, points.len())?;
+    let mut point_data = Vec::new();
+    let mut cell_data = Vec::new();
+    for array in &file.arrays {
+        let (rows, fields) = match array.part {
+            Part::PointData => (file.points, &mut point_data),
+            Part::CellData => (file.cells, &mut cell_data),
+            Part::Points | Part::Cells => continue,
+        };
+        fields.push(Field {
+            name: array.name.clone(),
+            components: array.components,
+            values: file.reals(array, rows, false)?,
+        });
+    }
+    let mut content = sorter.finish(points, point_data, cell_data)?;
+    content.notices.extend(file.notices);
+    Ok(content)
+}
+
+fn read_points(file: &File<'_>) -> Result<Vec<[f64; 3]>, Fault> {
+    let Some(array) = file.arrays.iter().find(|array| array.part == Part::Points) else {
+        if file.points == 0 {
+            return Ok(Vec::new());
+        }
+        return Err(Fault::whole("there is no array of points; the file is incomplete"));
+    };
+    if array.components != 3 {
+        return Err(Fault::text(
+            array.at,
+            format!("points have {} coordinates here; write three", array.components),
+        ));
+    }
+    let values = file.reals(array, file.points, true)?;
+    if let Some(bad) = values.iter().position(|value| !value.is_finite()) {
+        return Err(Fault::text(
+            array.at,
+            format!(
+                "coordinate {} of point {} (from 0) is {}, not a finite number",
+                bad % 3,
+                bad / 3,
+                values[bad]
+            ),
+        ));
+    }
+    Ok(values.as_chunks().0.to_vec())
+}
+
+fn read_cells(file: &File<'_>, points: usize) -> Result<Sorter, Fault> {
+    let mut sorter = Sorter::default();
+    if file.cells == 0 {
+        return Ok(sorter);
+    }
+    let offsets_array = file.cell_array("offsets")?;
+    let offsets = file.integers(offsets_array, file.cells)?;
+    let types = file.integers(file.cell_array("types")?, file.cells)?;
+    let connectivity_array = file.cell_array("connectivity")?;
+    let length = usize::try_from(offsets.last().copied().unwrap_or(0))
+        .map_err(|_| Fault::text(offsets_array.at, "the last offset is negative; the file is damaged"))?;
+    let connectivity = file.integers(connectivity_array, length)?;
+    let mut corners = Vec::new();
+    let mut start = 0;
+    for (cell, (&end, &code)) in offsets.iter().zip(&types).enumerate() {
+        let range = usize::try_from(end).ok().and_then(|end| connectivity.get(start..end));
+        let Some(indices) = range else {
+            return Err(Fault::text(
+                offsets_array.at,
+                format!("the offset of cell {cell} (from 0) is {end}; it must lie between {start} and {length}"),
+            ));
+        };
+        start += indices.len();
+        corners.clear();
+        for &index in indices {
+            match u32::try_from(index) {
+                Ok(corner) if (corner as usize) < points => corners.push(corner),
+                _ => {
+                    return Err(Fault::text(
+                        connectivity_array.at,
+                        format!("cell {cell} (from 0) names point {index}; there are {points}, counted from 0"),
+                    ));
+                }
+            }
+        }
+        vtk::add_cell(&mut sorter, code, &corners)
+            .map_err(|message| Fault::text(connectivity_array.at, format!("cell {cell} (from 0): {message}")))?;
+    }
+    Ok(sorter)
+}
+
+impl<'a> File<'a> {
+    fn parse(bytes: &'a [u8]) -> Result<File<'a>, Fault> {
+        let mut file = File {
+            bytes,
+            order: Order::Little,
+            header: Scalar::UInt32,
+            compressed: false,
+            points: 0,
+            cells: 0,
+            arrays: Vec::new(),
+            appended: None,
+            notices: Vec::new(),
+            decoded: Cell::new(0),
+        };
+        let mut reader = Reader::from_reader(bytes);
+        let mut part = None;
+        let mut pieces = 0;
+        let mut seen_file = false;
+        // How deep we are within an array, and whether its text has been seen; it may hold other elements.
+        let mut array_open = false;
+        let mut inner = 0_usize;
+        loop {
+            let at = reader.buffer_position() as usize;
+            let event = reader.read_event().map_err(|error| {
+                Fault::text(reader.error_position() as usize, format!("the XML is damaged: {error}"))
+            })?;
+            let empty = matches!(event, Event::Empty(_));
+            match event {
+                Event::Start(tag) | Event::Empty(tag) => match tag.name().as_ref() {
+                    _ if array_open => inner += usize::from(!empty),
+                    b"VTKFile" => {
+                        seen_file = true;
+                        file.read_file_tag(&tag, at)?;
+                    }
+                    b"Piece" => {
+                        pieces += 1;
+                        if pieces > 1 {
+                            return Err(Fault::text(
+                                at,
+                                "a second piece; only files of one piece are read, merge them (VTK: vtkAppendFilter)",
+                            ));
+                        }
+                        file.points = count_attribute(&tag, at, "NumberOfPoints")?;
+                        file.cells = count_attribute(&tag, at, "NumberOfCells")?;
+                    }
+                    b"Points" => part = Some(Part::Points),
+                    b"Cells" => part = Some(Part::Cells),
+                    b"PointData" => part = Some(Part::PointData),
+                    b"CellData" => part = Some(Part::CellData),
+                    b"FieldData" => {
+                        part = None;
+                        file.notices
+                            .push("data of the whole file (FieldData) left out".to_string());
+                    }
+                    b"DataArray" | b"Array" => {
+                        if let Some(part) = part {
+                            file.read_array_tag(&tag, at, part, reader.buffer_position() as usize)?;
+                        }
+                        array_open = !empty;
+                        inner = 0;
+                    }
+                    b"AppendedData" => {
+                        let raw = match attribute(&tag, at, "encoding")?.as_deref() {
+                            Some("raw") => true,
+                            Some("base64") | None => false,
+                            Some(other) => {
+                                return Err(Fault::text(
+                                    at,
+                                    format!("the encoding {other:?} is unknown; raw and base64 are read"),
+                                ));
+                            }
+                        };
+                        let from = reader.buffer_position() as usize;
+                        let mark = bytes[from..].iter().position(|&byte| byte == b'_');
+                        let mark = mark.ok_or_else(|| {
+                            Fault::text(at, "the appended data do not start with '_'; the file is cut off")
+                        })?;
+                        file.appended = Some((from + mark + 1, raw));
+                        // What follows need not be XML.
+                        break;
+                    }
+                    _ => {}
+                },
+                Event::Text(text) if array_open && inner == 0 => {
+                    let blank = text.trim_ascii().is_empty();
+                    if let Some(array) = file.arrays.last_mut()
+                        && !blank
+                        && array.end == array.start
+                    {
+                        (array.start, array.end) = (at, reader.buffer_position() as usize);
+                    }
+                }
+                Event::End(tag) => match tag.name().as_ref() {
+                    b"DataArray" | b"Array" if inner == 0 => array_open = false,
+                    _ if array_open => inner = inner.saturating_sub(1),
+                    b"Points" | b"Cells" | b"PointData" | b"CellData" => part = None,
+                    _ => {}
+                },
+                Event::Eof => break,
+                _ => {}
+            }
+        }
+        if !seen_file {
+            return Err(Fault::whole(
+                "this is XML, but not a VTK file: there is no element VTKFile",
+            ));
+        }
+        if pieces == 0 {
+            return Err(Fault::whole(
+                "there is no element Piece with points and cells; the file is cut off",
+            ));
+        }
+        Ok(file)
+    }
+
+    fn read_file_tag(&mut self, tag: &BytesStart<'_>, at: usize) -> Result<(), Fault> {
+        match attribute(tag, at, "type")?.as_deref() {
+            Some("UnstructuredGrid") => {}
+            other => {
+                return Err(Fault::text(
+                    at,
+                    format!(
+                        "the VTK file holds {}; only UnstructuredGrid (.vtu) is read",
+                        other.unwrap_or("data of no named type")
+                    ),
+                ));
+            }
+        }
+        self.order = match attribute(tag, at, "byte_order")?.as_deref() {
+            Some("BigEndian") => Order::Big,
+            Some("LittleEndian") | None => Order::Little,
+            Some(other) => {
+                return Err(Fault::text(
+                    at,
+                    format!("the byte order {other:?} is unknown; write LittleEndian or BigEndian"),
+                ));
+            }
+        };
+        self.header = match attribute(tag, at, "header_type")?.as_deref() {
+            Some("UInt64") => Scalar::UInt64,
+            Some("UInt32") | None => Scalar::UInt32,
+            Some(other) => {
+                return Err(Fault::text(
+                    at,
+                    format!("the header type {other:?} is unknown; write UInt32 or UInt64"),
+                ));
+            }
+        };
+        self.compressed = match attribute(tag, at, "compressor")?.as_deref() {
+            None | Some("") => false,
+            Some("vtkZLibDataCompressor") => true,
+            Some(other) => {
+                return Err(Fault::text(
+                    at,
+                    format!(
+                        "the compressor {other} is not known; write the file with vtkZLibDataCompressor or without one"
+                    ),
+                ));
+            }
+        };
+        Ok(())
+    }
+
+    fn read_array_tag(&mut self, tag: &BytesStart<'_>, at: usize, part: Part, start: usize) -> Result<(), Fault> {
+        let name = attribute(tag, at, "Name")?.unwrap_or_default();
+        let scalar = match attribute(tag, at, "type")?.as_deref() {
+            Some("Int8") => Scalar::Int8,
+            Some("UInt8") => Scalar::UInt8,
+            Some("Int16") => Scalar::Int16,
+            Some("UInt16") => Scalar::UInt16,
+            Some("Int32") => Scalar::Int32,
+            Some("UInt32") => Scalar::UInt32,
+            Some("Int64") => Scalar::Int64,
+            Some("UInt64") => Scalar::UInt64,
+            Some("Float32") => Scalar::Float32,
+            Some("Float64") => Scalar::Float64,
+            Some("String") if matches!(part, Part::PointData | Part::CellData) => {
+                self.notices.push(format!("the field {name:?} of strings left out"));
+                return Ok(());
+            }
+            Some(other) => {
+                return Err(Fault::text(
+                    at,
+                    format!("the number type {other:?} of array {name:?} is unknown"),
+                ));
+            }
+            None => return Err(Fault::text(at, format!("the array {name:?} has no attribute type"))),
+        };
+        let components = match attribute(tag, at, "NumberOfComponents")?.as_deref() {
+            None | Some("") => 1,
+            Some(text) => match text.trim().parse() {
+                Ok(count @ 1..=1_000_000) => count,
+                _ => {
+                    return Err(Fault::text(
+                        at,
+                        format!("NumberOfComponents of array {name:?} is {text:?}; write a number from 1"),
+                    ));
+                }
+            },
+        };
+        let form = match attribute(tag, at, "format")?.as_deref() {
+            Some("ascii") | None => Form::Ascii,
+            Some("binary") => Form::Inline,
+            Some("appended") => Form::Appended(count_attribute(tag, at, "offset")?),
+            Some(other) => {
+                return Err(Fault::text(
+                    at,
+                    format!("the format {other:?} of array {name:?} is unknown; write ascii, binary or appended"),
+                ));
+            }
+        };
+        self.arrays.push(Array {
+            at,
+            name,
+            part,
+            scalar,
+            components,
+            form,
+            start,
+            end: start,
+        });
+        Ok(())
+    }
+
+    fn cell_array(&self, name: &str) -> Result<&Array, Fault> {
+        self.arrays
+            .iter()
+            .find(|array| array.part == Part::Cells && array.name == name)
+            .ok_or_else(|| Fault::whole(format!("the cells have no array {name:?}; the file is incomplete")))
+    }
+
+    /// The numbers of an array of `rows` rows.
+    fn reals(&self, array: &Array, rows: usize, finite: bool) -> Result<Vec<f64>, Fault> {
+        let count = self.length(array, rows)?;
+        if let Form::Ascii = array.form {
+            let name = &array.name;
+            self.ascii(array, count, |text, row| {
+                let what = format_args!("number {row} of array {name:?}");
+                if finite { text.finite(what) } else { text.real(what) }
+            })
+        } else {
+            let bytes = self.decode(array, count)?;
+            Ok(binary::reals(array.scalar, self.order, &bytes))
+        }
+    }
+
+    /// The integers of an array of `count` numbers.
+    fn integers(&self, array: &Array, count: usize) -> Result<Vec<i64>, Fault> {
+        if let Form::Ascii = array.form {
+            let name = &array.name;
+            self.ascii(array, count, |text, row| {
+                text.integer(format_args!("integer {row} of array {name:?}"))
+            })
+        } else {
+            let bytes = self.decode(array, count)?;
+            binary::integers(array.scalar, self.order, &bytes).ok_or_else(|| {
+                Fault::text(
+                    array.at,
+                    format!("the array {:?} holds real numbers; integers are expected", array.name),
+                )
+            })
+        }
+    }
+
+    fn length(&self, array: &Array, rows: usize) -> Result<usize, Fault> {
+        rows.checked_mul(array.components).ok_or_else(|| {
+            Fault::text(
+                array.at,
+                format!(
+                    "the array {:?} would hold {rows} x {} numbers; correct the count",
+                    array.name, array.components
+                ),
+            )
+        })
+    }
+
+    fn ascii<T>(
+        &self,
+        array: &Array,
+        count: usize,
+        mut next: impl FnMut(&mut Text<'_>, usize) -> Result<T, Fault>,
+    ) -> Result<Vec<T>, Fault> {
+        let mut text = Text::part(self.bytes, array.start, array.end, None);
+        if count > text.remaining().div_ceil(2) {
+            return Err(Fault::text(
+                array.at,
+                format!(
+                    "the array {:?} should hold {count} numbers, but its text has {} bytes; correct the count or restore the text",
+                    array.name,
+                    text.remaining()
+                ),
+            ));
+        }
+        let mut values = Vec::with_capacity(count);
+        for row in 0..count {
+            values.push(next(&mut text, row)?);
+        }
+        match text.word() {
+            None => Ok(values),
+            Some(_) => Err(Fault::text(
+                text.at(),
+                format!(
+                    "the array {:?} holds more than the {count} numbers that are expected",
+                    array.name
+                ),
+            )),
+        }
+    }
+
+    /// The bytes of an array of `count` numbers in binary form.
+    fn decode(&self, array: &Array, count: usize) -> Result<Vec<u8>, Fault> {
+        let fault = |message: String| Fault::text(array.at, format!("the array {:?} {message}", array.name));
+        let wanted = count
+            .checked_mul(array.scalar.size())
+            .ok_or_else(|| fault(format!("would hold {count} numbers; correct the count")))?;
+        let decoded;
+        let data: &[u8] = match (array.form, self.appended) {
+            (Form::Appended(_), None) => {
+                return Err(fault(
+                    "refers to appended data, but there are none; the file is cut off".to_string(),
+                ));
+            }
+            (Form::Appended(offset), Some((start, raw))) => {
+                let all = &self.bytes[start..];
+                let own = all.get(offset..).ok_or_else(|| {
+                    fault(format!(
+                        "starts at {offset}, beyond the {} appended bytes; the file is cut off",
+                        all.len()
+                    ))
+                })?;
+                if raw {
+                    own
+                } else {
+                    decoded = self
+                        .decode_base64(own, self.next_offset(offset).map(|next| next - offset))
+                        .map_err(fault)?;
+                    &decoded
+                }
+            }
+            (Form::Inline | Form::Ascii, _) => {
+                decoded = self
+                    .decode_base64(&self.bytes[array.start..array.end], None)
+                    .map_err(fault)?;
+                &decoded
+            }
+        };
+        let number = |index: usize| -> Option<usize> {
+            let size = self.header.size();
+            let bytes = data.get(index.checked_mul(size)?..(index + 1).checked_mul(size)?)?;
+            let value = binary::integers(self.header, self.order, bytes)?;
+            usize::try_from(*value.first()?).ok()
+        };
+        let cut = || fault("is cut off or damaged; restore the file".to_string());
+        let contradiction = |found: usize| {
+            fault(format!(
+                "holds {found} bytes, {count} x {} are expected; correct the count or restore the file",
+                array.scalar.size()
+            ))
+        };
+        if !self.compressed {
+            let length = number(0).ok_or_else(cut)?;
+            if length != wanted {
+                return Err(contradiction(length));
+            }
+            self.account(length).map_err(fault)?;
+            let body = &data[self.header.size()..];
+            return body.get(..length).map(<[u8]>::to_vec).ok_or_else(cut);
+        }
+
+        let (blocks, block, last) = match (number(0), number(1), number(2)) {
+            (Some(blocks), Some(block), Some(last)) => (blocks, block, last),
+            // An empty array may have a header of one zero.
+            (Some(0), ..) => (0, 0, 0),
+            _ => return Err(cut()),
+        };
+        if blocks > data.len() / self.header.size() {
+            return Err(cut());
+        }
+        let whole_blocks = blocks.saturating_sub(usize::from(last > 0));
+        let total = whole_blocks.checked_mul(block).and_then(|size| size.checked_add(last));
+        let total = if blocks == 0 { Some(0) } else { total };
+        if total != Some(wanted) {
+            return Err(contradiction(total.unwrap_or(usize::MAX)));
+        }
+        let start = (3 + blocks) * self.header.size();
+        let mut end = start;
+        let mut blocks_at = Vec::with_capacity(blocks);
+        for index in 0..blocks {
+            let next = number(3 + index).and_then(|size| end.checked_add(size));
+            let next = next.filter(|&next| next <= data.len()).ok_or_else(cut)?;
+            blocks_at.push(end..next);
+            end = next;
+        }
+        self.account(end).map_err(fault)?;
+        if wanted > (end - start).saturating_mul(MOST_GROWTH) {
+            return Err(cut());
+        }
+        let mut values = Vec::with_capacity(wanted);
+        for (index, range) in blocks_at.into_iter().enumerate() {
+            let size = if index < whole_blocks { block } else { last };
+            let before = values.len();
+            flate2::read::ZlibDecoder::new(&data[range])
+                .take(size as u64)
+                .read_to_end(&mut values)
+                .map_err(|error| fault(format!("cannot be decompressed ({error}); restore the file")))?;
+            if values.len() - before != size {
+                return Err(cut());
+            }
+        }
+        Ok(values)
+    }
+
+    /// Keeps arrays that share their place from multiplying the file: the sum of all may be twice its size (base64, decoded).
+    fn account(&self, bytes: usize) -> Result<(), String> {
+        self.decoded.set(self.decoded.get().saturating_add(bytes));
+        if self.decoded.get() > 2 * self.bytes.len() {
+            return Err("overlaps other arrays; each array needs its own place".to_string());
+        }
+        Ok(())
+    }
+
+    /// The smallest offset of an appended array beyond `offset`.
+    fn next_offset(&self, offset: usize) -> Option<usize> {
+        let offsets = self.arrays.iter().filter_map(|array| match array.form {
+            Form::Appended(other) if other > offset => Some(other),
+            _ => None,
+        });
+        offsets.min()
+    }
+
+    /// Decodes base64 in which padded pieces follow one another, up to `length` letters or the next tag.
+    fn decode_base64(&self, text: &[u8], length: Option<usize>) -> Result<Vec<u8>, String> {
+        let text = &text[..length.unwrap_or(text.len()).min(text.len())];
+        let end = text.iter().position(|&byte| byte == b'<').unwrap_or(text.len());
+        self.account(end)?;
+        let mut letters = text[..end].to_vec();
+        letters.retain(|byte| !byte.is_ascii_whitespace());
+        let mut decoded = Vec::with_capacity(letters.len() / 4 * 3 + 3);
+        let mut rest = &letters[..];
+        while !rest.is_empty() {
+            let padding = rest.iter().position(|&byte| byte == b'=').unwrap_or(rest.len());
+            let after = padding + rest[padding..].iter().take_while(|&&byte| byte == b'=').count();
+            BASE64
+                .decode_vec(&rest[..padding], &mut decoded)
+                .map_err(|error| format!("is no valid base64 ({error}); restore the file"))?;
+            rest = &rest[after..];
+        }
+        Ok(decoded)
+    }
+}
+
+fn attribute(tag: &BytesStart<'_>, at: usize, name: &str) -> Result<Option<String>, Fault> {
+    let damaged = |error: &dyn std::fmt::Display| Fault::text(at, format!("the XML is damaged: {error}"));
+    let found = tag.try_get_attribute(name).map_err(|error| damaged(&error))?;
+    match found {
+        None => Ok(None),
+        Some(found) => {
+            let value = found
+                .normalized_value(XmlVersion::Implicit1_0)
+                .map_err(|error| damaged(&error))?;
+            Ok(Some(value.into_owned()))
+        }
+    }
+}
+
+fn count_attribute(tag: &BytesStart<'_>, at: usize, name: &str) -> Result<usize, Fault> {
+    let text = attribute(tag, at, name)?.unwrap_or_default();
+    text.trim()
+        .parse()
+        .map_err(|_| Fault::text(at, format!("{name} is {text:?}; write a number from 0")))
+}
+
+/// A field as it is written: its name, the numbers per row, and the rows one after the other.
+pub type FieldView<'a> = (&'a str, usize, &'a [f64]);
+
+/// A VTU file of `points`, `cells` and fields with one row a point or a cell (cells in the order of [`Content`]).
+///
+/// # Panics
+/// When a field does not have a row for every point or cell.
+pub fn write(
+    points: &[[f64; 3]],
+    cells: Cells<'_>,
+    point_data: &[FieldView<'_>],
+    cell_data: &[FieldView<'_>],
+) -> Vec<u8> {
+    let mut out = String::new();
+    // Writing to a string cannot fail.
+    let _ = write!(
+        out,
+        "<?xml version=\"1.0\"?>\n\
+         <VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\" \
+         compressor=\"vtkZLibDataCompressor\">\n\
+         <UnstructuredGrid>\n<Piece NumberOfPoints=\"{}\" NumberOfCells=\"{}\">\n",
+        points.len(),
+        cells.count()
+    );
+    for (part, rows, fields) in [
+        ("PointData", points.len(), point_data),
+        ("CellData", cells.count(), cell_data),
+    ] {
+        let _ = writeln!(out, "<{part}>");
+        for &(name, components, values) in fields {
+            assert_eq!(
+                values.len(),
+                rows * components,
+                "field {name:?} has a row for each point or cell"
+            );
+            write_array(
+                &mut out,
+                name,
+                "Float64",
+                components,
+                values.iter().flat_map(|value| value.to_le_bytes()),
+            );
+        }
+        let _ = writeln!(out, "</{part}>");
+    }
+    out.push_str("<Points>\n");
+    let coordinates = points.as_flattened().iter().flat_map(|value| value.to_le_bytes());
+    write_array(&mut out, "Points", "Float64", 3, coordinates);
+    out.push_str("</Points>\n<Cells>\n");
+    let corners = cells.iter().flat_map(|(_, corners)| corners);
+    write_array(
+        &mut out,
+        "connectivity",
+        "Int64",
+        1,
+        corners.flat_map(|&corner| i64::from(corner).to_le_bytes()),
+    );
+    let offsets = cells.iter().scan(0_i64, |end, (_, corners)| {
+        *end += corners.len() as i64;
+        Some(*end)
+    });
+    write_array(&mut out, "offsets", "Int64", 1, offsets.flat_map(i64::to_le_bytes));
+    write_array(
+        &mut out,
+        "types",
+        "UInt8",
+        1,
+        cells.iter().map(|(kind, _)| vtk::code(kind)),
+    );
+    out.push_str("</Cells>\n</Piece>\n</UnstructuredGrid>\n</VTKFile>\n");
+    out.into_bytes()
+}
+
+fn write_array(out: &mut String, name: &str, kind: &str, components: usize, bytes: impl Iterator<Item = u8>) {
+    let bytes: Vec<u8> = bytes.collect();
+    let mut header = vec![
+        bytes.len().div_ceil(BLOCK) as u64,
+        BLOCK as u64,
+        (bytes.len() % BLOCK) as u64,
+    ];
+    let mut packed = Vec::with_capacity(bytes.len() / 2);
+    for block in bytes.chunks(BLOCK) {
+        let before = packed.len();
+        let mut encoder = flate2::write::ZlibEncoder::new(packed, flate2::Compression::default());
+        let written = encoder.write_all(block).and_then(|()| encoder.finish());
+        packed = written.expect("memory takes every byte");
+        header.push((packed.len() - before) as u64);
+    }
+    let header: Vec<u8> = header.iter().flat_map(|size| size.to_le_bytes()).collect();
+    let _ = writeln!(
+        out,
+        "<DataArray type=\"{kind}\" Name=\"{}\" NumberOfComponents=\"{components}\" format=\"binary\">",
+        quick_xml::escape::escape(name)
+    );
+    BASE64.encode_string(header, out);
+    BASE64.encode_string(packed, out);
+    out.push_str("\n</DataArray>\n");
+}
+
+/// Writes the whole of `content`.
+pub(super) fn write_content(content: &Content) -> Result<Written, String> {
+    Ok(Written {
+        bytes: write(
+            &content.points,
+            content.cells(),
+            &views(&content.point_data),
+            &views(&content.cell_data),
+        ),
+        notices: Vec::new(),
+    })
+}
+
+fn views(fields: &[Field]) -> Vec<FieldView<'_>> {
+    fields
+        .iter()
+        .map(|field| (field.name.as_str(), field.components, field.values.as_slice()))
+        .collect()
+}

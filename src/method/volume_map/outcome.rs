@@ -1,0 +1,253 @@
+//! What is reported of a map: its metrics and the mesh with fields to colour it by.
+
+use super::metrics::energy_metric;
+use super::problem::Problem;
+use super::settings::{Settings, Weighting};
+use crate::energy::mapping::{Density, MappingEnergy};
+use crate::energy::{self, Energy};
+use crate::linalg::vector3::{cofactor, dot};
+use crate::mesh::connectivity::Boundary;
+use crate::mesh::format::{Cells, vtu};
+use crate::mesh::quality::scaled_jacobian;
+use crate::mesh::{self, TetrahedralMesh, TriangleMesh};
+use crate::method::Failure;
+use nalgebra::Matrix3;
+use std::collections::BTreeMap;
+
+/// A determinant at most this times the product of edge lengths, image over source, is zero to rounding.
+const FLAT: f64 = 1e-14;
+
+/// A map in the units of the files with what follows from it.
+pub struct Measured {
+    pub metrics: BTreeMap<String, f64>,
+    /// The map as a VTU file.
+    pub mesh: Vec<u8>,
+    /// Tetrahedra whose determinant is not positive.
+    pub inverted: Vec<u32>,
+}
+
+/// Measures the map onto `positions`, given in the solver's units.
+pub fn measure(problem: &Problem, settings: &Settings, positions: &[[f64; 3]]) -> Result<Measured, Failure> {
+    let density = settings.density()?;
+    let given = problem.to_given_units(positions);
+    // The source at the target's volume, 1: the scale at which energies and determinants compare.
+    let scale = problem.source_volume().cbrt().recip();
+    let rest = TetrahedralMesh {
+        points: problem
+            .source
+            .points
+            .iter()
+            .map(|point| point.map(|coordinate| coordinate * scale))
+            .collect(),
+        cells: problem.source.cells.clone(),
+    };
+    let weights = problem.volume_weights();
+    let failure = |error: energy::mapping::InvalidRest| Failure {
+        kind: "invalid-input".to_string(),
+        reason: format!("source mesh: {error}"),
+    };
+    let mut mapping = MappingEnergy::new(&rest, &weights, Density::new(density), None).map_err(failure)?;
+    let flat = positions.as_flattened();
+    let cells = rest.cells.len();
+    let mut determinants = vec![0.0; cells];
+    let mut singular_values = vec![0.0; 3 * cells];
+    mapping.determinants(flat, &mut determinants);
+    mapping.singular_values(flat, &mut singular_values);
+
+    let mut metrics = BTreeMap::new();
+    let mut set = |name: &str, value: f64| {
+        metrics.insert(name.to_string(), value);
+    };
+    for other in energy::energies() {
+        mapping.set_density(Density::new(*other));
+        set(&energy_metric(other.name()), mapping.value(flat));
+    }
+
+    // The chosen energy as it was minimized: on the problem's source, with the problem's weights.
+    let densities = densities(problem, density, positions);
+    let mean = |weights: &[f64]| {
+        weights
+            .iter()
+            .zip(&densities)
+            .map(|(weight, value)| weight * value)
+            .sum::<f64>()
+    };
+    let minimized = match settings.weighting {
+        Weighting::Target => {
+            let weighted: Vec<f64> = weights
+                .iter()
+                .zip(&determinants)
+                .map(|(weight, det)| weight * det)
+                .collect();
+            mean(&weighted) / weighted.iter().sum::<f64>()
+        }
+        weighting => mean(&problem.weights(weighting)),
+    };
+    set("energy", minimized);
+    let given_volume = problem.unit.powi(3) / problem.ratio;
+    set("energy_integral", given_volume * mean(&weights));
+
+    // Singular values in the units of the files.
+    let stretch = problem.ratio.cbrt();
+    let ratios: Vec<f64> = singular_values
+        .chunks_exact(3)
+        .map(|s| {
+            let ratio = s[0] / s[2].abs();
+            ratio + 1.0 / ratio
+        })
+        .collect();
+    let average = |values: &[f64]| {
+        weights
+            .iter()
+            .zip(values)
+            .map(|(weight, value)| weight * value)
+            .sum::<f64>()
+    };
+    let largest = |values: &[f64]| values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    set("d_aa", average(&ratios));
+    set("d_ma", largest(&ratios));
+    let inverted: Vec<u32> = (0..cells as u32)
+        .filter(|&cell| !(determinants[cell as usize] > 0.0))
+        .collect();
+    let volume_distortions = |factor: f64| -> Vec<f64> {
+        determinants
+            .iter()
+            .map(|&determinant| factor * determinant + 1.0 / (factor * determinant))
+            .collect()
+    };
+    let (as_given, rescaled) = (volume_distortions(stretch.powi(3)), volume_distortions(1.0));
+    let defined = |value: f64| if inverted.is_empty() { value } else { f64::NAN };
+    set("d_av", defined(average(&as_given)));
+    set("d_mv", defined(largest(&as_given)));
+    set("d_av_rescaled", defined(average(&rescaled)));
+    set("d_mv_rescaled", defined(largest(&rescaled)));
+
+    set(
+        "inverted",
+        determinants.iter().filter(|&&determinant| determinant < 0.0).count() as f64,
+    );
+    let degenerate = rest.cells.iter().zip(&determinants).filter(|&(&cell, &determinant)| {
+        let edges = |points: &[[f64; 3]]| {
+            let [a, b, c, d] = cell.map(|vertex| points[vertex as usize]);
+            [b, c, d]
+                .iter()
+                .map(|&point| mesh::length(mesh::subtract(point, a)))
+                .product::<f64>()
+        };
+        determinant.abs() <= FLAT * edges(positions) / edges(&rest.points)
+    });
+    set("degenerate", degenerate.count() as f64);
+    set("inverted_lower_bound", problem.obstacles.lower_bound as f64);
+    set(
+        "min_determinant",
+        determinants.iter().copied().fold(f64::INFINITY, f64::min),
+    );
+
+    let image = TetrahedralMesh {
+        points: given.clone(),
+        cells: rest.cells.clone(),
+    };
+    let jacobians: Vec<f64> = image
+        .cells
+        .iter()
+        .map(|&cell| scaled_jacobian(image.corners(cell)))
+        .collect();
+    set(
+        "scaled_jacobian_min",
+        jacobians.iter().copied().fold(f64::INFINITY, f64::min),
+    );
+    set("scaled_jacobian_mean", jacobians.iter().sum::<f64>() / cells as f64);
+
+    let distances: Vec<f64> = problem
+        .boundary
+        .vertices
+        .iter()
+        .map(|&vertex| {
+            mesh::length(mesh::subtract(
+                given[vertex as usize],
+                problem.given_targets[vertex as usize],
+            ))
+        })
+        .collect();
+    set(
+        "constraint_residual",
+        distances.iter().map(|distance| distance * distance).sum::<f64>() / problem.unit.powi(2),
+    );
+    let on_target: Vec<[f64; 3]> = problem
+        .boundary
+        .vertices
+        .iter()
+        .map(|&vertex| problem.given_targets[vertex as usize])
+        .collect();
+    set(
+        "constraint_distance",
+        distances.iter().copied().fold(0.0, f64::max) / mesh::diagonal(&on_target),
+    );
+
+    let enclosed = enclosed_volume(&problem.boundary, positions);
+    set(
+        "mean_determinant_error",
+        (average(&determinants) / enclosed - 1.0).abs(),
+    );
+    set("volume_ratio", problem.ratio);
+    set("vertices", rest.points.len() as f64);
+    set("tetrahedra", cells as f64);
+    set("boundary_vertices", problem.boundary.vertices.len() as f64);
+
+    let flags: Vec<f64> = determinants
+        .iter()
+        .map(|&determinant| if determinant > 0.0 { 0.0 } else { 1.0 })
+        .collect();
+    let mesh = vtu::write(
+        &given,
+        Cells {
+            tetrahedra: &image.cells,
+            ..Cells::default()
+        },
+        &[("source", 3, problem.given.as_flattened())],
+        &[
+            ("angle_distortion", 1, &ratios),
+            ("volume_distortion", 1, &as_given),
+            ("determinant", 1, &determinants),
+            ("energy_density", 1, &densities),
+            ("scaled_jacobian", 1, &jacobians),
+            ("inverted", 1, &flags),
+        ],
+    );
+    Ok(Measured {
+        metrics,
+        mesh,
+        inverted,
+    })
+}
+
+/// The volume within the image of the boundary.
+fn enclosed_volume(boundary: &Boundary, positions: &[[f64; 3]]) -> f64 {
+    TriangleMesh {
+        points: positions.to_vec(),
+        cells: boundary.triangles.clone(),
+    }
+    .enclosed_volume()
+}
+
+/// The energy density in every tetrahedron of the problem's source.
+fn densities(problem: &Problem, density: &dyn Energy, positions: &[[f64; 3]]) -> Vec<f64> {
+    let edges = |points: &[[f64; 3]], cell: [u32; 4]| {
+        let [a, b, c, d] = cell.map(|vertex| points[vertex as usize]);
+        [b, c, d].map(|point| mesh::subtract(point, a))
+    };
+    problem
+        .source
+        .cells
+        .iter()
+        .map(|&cell| {
+            let (before, after) = (edges(&problem.source.points, cell), edges(positions, cell));
+            let cof = cofactor(&before);
+            let determinant = dot(before[0], cof[0]);
+            let jacobian = Matrix3::from_fn(|row, column| {
+                (0..3).map(|edge| after[edge][row] * cof[edge][column]).sum::<f64>() / determinant
+            });
+            density.value(&jacobian)
+        })
+        .collect()
+}

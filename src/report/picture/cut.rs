@@ -1,0 +1,152 @@
+//! What is seen of a mesh: its boundary faces, or what a plane leaves of them and the section through the cells.
+
+use super::solid::Solid;
+
+/// A polygon to draw, of a cell.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Facet {
+    pub corners: Vec<[f64; 3]>,
+    pub cell: u32,
+    /// Lies in the cutting plane.
+    pub section: bool,
+}
+
+/// Keeps the points with `normal . x <= offset`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Plane {
+    pub normal: [f64; 3],
+    pub offset: f64,
+}
+
+fn dot(left: [f64; 3], right: [f64; 3]) -> f64 {
+    left[0] * right[0] + left[1] * right[1] + left[2] * right[2]
+}
+
+impl Plane {
+    /// The plane through the middle of the points, square to the axis that points most at the eye; what is nearer goes.
+    pub fn towards(eye: [f64; 3], points: &[[f64; 3]]) -> Plane {
+        let axis = (0..3)
+            .max_by(|&left, &right| eye[left].abs().total_cmp(&eye[right].abs()))
+            .unwrap_or(0);
+        let low = points.iter().map(|point| point[axis]).fold(f64::INFINITY, f64::min);
+        let high = points.iter().map(|point| point[axis]).fold(f64::NEG_INFINITY, f64::max);
+        let mut normal = [0.0; 3];
+        normal[axis] = eye[axis].signum();
+        Plane {
+            normal,
+            offset: normal[axis] * 0.5 * (low + high),
+        }
+    }
+
+    fn height(&self, point: [f64; 3]) -> f64 {
+        dot(self.normal, point) - self.offset
+    }
+}
+
+/// The faces of tetrahedra that belong to one cell only, with that cell.
+pub fn boundary(tetrahedra: &[[u32; 4]]) -> Vec<([u32; 3], u32)> {
+    let mut faces: Vec<([u32; 3], [u32; 3], u32)> = Vec::with_capacity(4 * tetrahedra.len());
+    for (index, cell) in tetrahedra.iter().enumerate() {
+        for face in [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]] {
+            let corners = face.map(|corner: usize| cell[corner]);
+            let mut key = corners;
+            key.sort_unstable();
+            faces.push((key, corners, index as u32));
+        }
+    }
+    faces.sort_unstable();
+    let mut boundary = Vec::new();
+    let mut start = 0;
+    while start < faces.len() {
+        let end = start
+            + faces[start..]
+                .iter()
+                .take_while(|face| face.0 == faces[start].0)
+                .count();
+        if end - start == 1 {
+            boundary.push((faces[start].1, faces[start].2));
+        }
+        start = end;
+    }
+    boundary
+}
+
+/// Everything to draw of the mesh at these positions.
+pub fn facets(solid: &Solid, points: &[[f64; 3]], plane: Option<&Plane>) -> Vec<Facet> {
+    let faces: Vec<([u32; 3], u32)> = if solid.is_volume() {
+        boundary(&solid.tetrahedra)
+    } else {
+        solid
+            .triangles
+            .iter()
+            .zip(0..)
+            .map(|(triangle, index)| (*triangle, index))
+            .collect()
+    };
+    let at = |index: u32| points[index as usize];
+    let mut facets: Vec<Facet> = Vec::with_capacity(faces.len());
+    for (face, cell) in faces {
+        let corners: Vec<[f64; 3]> = face.iter().map(|&corner| at(corner)).collect();
+        let corners = match plane {
+            Some(plane) => clip(&corners, plane),
+            None => corners,
+        };
+        if corners.len() >= 3 {
+            facets.push(Facet {
+                corners,
+                cell,
+                section: false,
+            });
+        }
+    }
+    let Some(plane) = plane else { return facets };
+    for (tetrahedron, cell) in solid.tetrahedra.iter().zip(0..) {
+        let corners = section(tetrahedron.map(at), plane);
+        if corners.len() >= 3 {
+            facets.push(Facet {
+                corners,
+                cell,
+                section: true,
+            });
+        }
+    }
+    facets
+}
+
+fn between(from: [f64; 3], to: [f64; 3], share: f64) -> [f64; 3] {
+    [0, 1, 2].map(|axis| from[axis] + share * (to[axis] - from[axis]))
+}
+
+fn clip(corners: &[[f64; 3]], plane: &Plane) -> Vec<[f64; 3]> {
+    let mut kept = Vec::with_capacity(4);
+    for (index, &corner) in corners.iter().enumerate() {
+        let next = corners[(index + 1) % corners.len()];
+        let (here, there) = (plane.height(corner), plane.height(next));
+        if here <= 0.0 {
+            kept.push(corner);
+        }
+        if (here <= 0.0) != (there <= 0.0) {
+            kept.push(between(corner, next, here / (here - there)));
+        }
+    }
+    kept
+}
+
+/// The triangle or quadrilateral in which a plane meets a tetrahedron, corners in order around it.
+fn section(corners: [[f64; 3]; 4], plane: &Plane) -> Vec<[f64; 3]> {
+    let heights = corners.map(|corner| plane.height(corner));
+    let below: Vec<usize> = (0..4).filter(|&corner| heights[corner] <= 0.0).collect();
+    let above: Vec<usize> = (0..4).filter(|&corner| heights[corner] > 0.0).collect();
+    let crossing = |from: usize, to: usize| {
+        between(
+            corners[from],
+            corners[to],
+            heights[from] / (heights[from] - heights[to]),
+        )
+    };
+    match (below.as_slice(), above.as_slice()) {
+        ([one], [a, b, c]) | ([a, b, c], [one]) => [a, b, c].map(|&other| crossing(*one, other)).to_vec(),
+        ([a, b], [c, d]) => vec![crossing(*a, *c), crossing(*a, *d), crossing(*b, *d), crossing(*b, *c)],
+        _ => Vec::new(),
+    }
+}

@@ -1,0 +1,495 @@
+//! Tables as the experiment file asks for them: rows of axis values, columns of figures, printed figures beside ours.
+//!
+//! Every job of the table's condition is in it. A job without a figure has the word for its end in the cell and its reason in
+//! a note. Several jobs in one row (axes that are not in `rows`) give their mean and sample standard deviation.
+
+pub mod csv;
+pub mod html;
+pub mod latex;
+pub mod markdown;
+pub mod terminal;
+
+use super::row::{Quantity, Row, label, same};
+use crate::experiment::file::{Experiment, Published, Table};
+use crate::experiment::record::Status;
+use crate::metric::Better;
+use serde_json::Value;
+use std::collections::BTreeMap;
+
+/// Relative tolerance of a printed figure whose row in the file states none.
+pub const TOLERANCE: f64 = 0.05;
+
+/// A table before it is typeset.
+#[derive(Clone, Debug)]
+pub struct Grid {
+    pub name: String,
+    pub title: String,
+    pub head: Vec<Head>,
+    pub body: Vec<Vec<Cell>>,
+    /// Explanations below the table; a cell's mark 1 points at the first.
+    pub notes: Vec<String>,
+    /// Rounding, marks and sources in sentences.
+    pub legend: Vec<String>,
+}
+
+/// A column's heading.
+#[derive(Clone, Debug)]
+pub struct Head {
+    pub text: String,
+    pub unit: String,
+    pub definition: String,
+    pub kind: Column,
+}
+
+/// What a column holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Column {
+    Axis,
+    Figure,
+    Printed,
+    Difference,
+}
+
+/// One cell.
+#[derive(Clone, Debug)]
+pub struct Cell {
+    pub content: Content,
+    /// The best of its group.
+    pub best: bool,
+    /// Number of the note that explains it, from 1.
+    pub mark: Option<usize>,
+}
+
+/// What a cell says.
+#[derive(Clone, Debug)]
+pub enum Content {
+    Text(String),
+    /// A figure with its significant digits and, over several jobs, standard deviation and count.
+    Figure {
+        value: f64,
+        digits: usize,
+        spread: Option<(f64, usize)>,
+    },
+    /// No figure, and the word why: `time-limit`.
+    Absent(String),
+    /// Ours against the printed one.
+    Difference {
+        text: String,
+        judgement: Judgement,
+    },
+    Empty,
+}
+
+/// What a difference from a printed figure means.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Judgement {
+    /// Equal within the tolerance or the printed digits.
+    Within,
+    Better,
+    Worse,
+    /// Different where no direction is better.
+    Differs,
+    /// A measurement on another machine: a ratio without judgement.
+    Ratio,
+}
+
+impl Judgement {
+    pub fn word(self) -> &'static str {
+        match self {
+            Judgement::Within => "within",
+            Judgement::Better => "better",
+            Judgement::Worse => "worse",
+            Judgement::Differs => "differs",
+            Judgement::Ratio => "",
+        }
+    }
+}
+
+impl Cell {
+    fn new(content: Content) -> Cell {
+        Cell {
+            content,
+            best: false,
+            mark: None,
+        }
+    }
+}
+
+/// Notes, each said once.
+#[derive(Default)]
+struct Notes(Vec<String>);
+
+impl Notes {
+    fn mark(&mut self, text: String) -> usize {
+        match self.0.iter().position(|note| *note == text) {
+            Some(index) => index + 1,
+            None => {
+                self.0.push(text);
+                self.0.len()
+            }
+        }
+    }
+}
+
+/// The jobs behind one line of the table.
+struct Line<'a> {
+    axes: Vec<Option<&'a Value>>,
+    jobs: Vec<&'a Row>,
+}
+
+/// The table that the file's `[[table]]` asks for.
+pub fn build(experiment: &Experiment, table: &Table, rows: &[Row]) -> Grid {
+    let lines = lines(table, rows);
+    let quantities: Vec<Quantity> = table
+        .columns
+        .iter()
+        .map(|name| Quantity::find(experiment, name))
+        .collect();
+    let printed: Vec<Vec<Option<Printed>>> = lines.iter().map(|line| printed_figures(table, line)).collect();
+    let has_printed: Vec<bool> = (0..quantities.len())
+        .map(|column| printed.iter().any(|line| line[column].is_some()))
+        .collect();
+
+    let mut notes = Notes::default();
+    let mut body = Vec::new();
+    let mut any_best = false;
+    let best = best_figures(&lines, &quantities);
+    for (index, line) in lines.iter().enumerate() {
+        let mut cells: Vec<Cell> = line
+            .axes
+            .iter()
+            .map(|value| Cell::new(Content::Text(value.map_or_else(String::new, label))))
+            .collect();
+        for (column, quantity) in quantities.iter().enumerate() {
+            let mut cell = figure(line, quantity, &mut notes);
+            cell.best = best[index][column];
+            any_best |= cell.best;
+            let ours = match cell.content {
+                Content::Figure { value, .. } => Some(value),
+                _ => None,
+            };
+            cells.push(cell);
+            if has_printed[column] {
+                match &printed[index][column] {
+                    Some(printed) => {
+                        cells.push(Cell::new(Content::Text(printed.text.clone())));
+                        cells.push(Cell::new(match ours {
+                            Some(ours) => printed.compare(ours, quantity),
+                            None => Content::Empty,
+                        }));
+                    }
+                    None => cells.extend([Cell::new(Content::Empty), Cell::new(Content::Empty)]),
+                }
+            }
+        }
+        body.push(cells);
+    }
+
+    Grid {
+        name: table.name.clone(),
+        title: table.title.clone().unwrap_or_else(|| table.name.clone()),
+        head: head(table, &quantities, &has_printed),
+        body,
+        notes: notes.0,
+        legend: legend(table, &quantities, &lines, any_best),
+    }
+}
+
+fn lines<'a>(table: &Table, rows: &'a [Row]) -> Vec<Line<'a>> {
+    let mut lines: Vec<Line<'a>> = Vec::new();
+    for row in rows.iter().filter(|row| row.matches(&table.condition)) {
+        let axes: Vec<Option<&Value>> = table.rows.iter().map(|axis| row.axis(axis)).collect();
+        let equal = |other: &Vec<Option<&Value>>| {
+            other.iter().zip(&axes).all(|(left, right)| match (left, right) {
+                (Some(left), Some(right)) => same(left, right),
+                (None, None) => true,
+                _ => false,
+            })
+        };
+        match lines.iter_mut().find(|line| equal(&line.axes)) {
+            Some(line) => line.jobs.push(row),
+            None => lines.push(Line { axes, jobs: vec![row] }),
+        }
+    }
+    lines
+}
+
+fn head(table: &Table, quantities: &[Quantity], has_printed: &[bool]) -> Vec<Head> {
+    let mut head: Vec<Head> = table
+        .rows
+        .iter()
+        .map(|axis| Head {
+            text: axis.clone(),
+            unit: String::new(),
+            definition: String::new(),
+            kind: Column::Axis,
+        })
+        .collect();
+    for (quantity, printed) in quantities.iter().zip(has_printed) {
+        let column = |text: &str, kind| Head {
+            text: text.into(),
+            unit: if kind == Column::Difference {
+                String::new()
+            } else {
+                quantity.unit.clone()
+            },
+            definition: if kind == Column::Figure {
+                quantity.definition.clone()
+            } else {
+                String::new()
+            },
+            kind,
+        };
+        head.push(column(&quantity.name, Column::Figure));
+        if *printed {
+            head.push(column("printed", Column::Printed));
+            head.push(column("difference", Column::Difference));
+        }
+    }
+    head
+}
+
+fn figures(line: &Line, name: &str) -> Vec<f64> {
+    line.jobs
+        .iter()
+        .filter_map(|job| job.figure(name))
+        .filter(|value| !value.is_nan())
+        .collect()
+}
+
+fn figure(line: &Line, quantity: &Quantity, notes: &mut Notes) -> Cell {
+    let values = figures(line, &quantity.name);
+    let troubled = line.jobs.iter().find(|job| job.remarkable());
+    let mark = troubled.map(|job| notes.mark(note(job, line.jobs.len())));
+    let content = if values.is_empty() {
+        match troubled {
+            Some(job) => Content::Absent(word(job).into()),
+            None => Content::Absent(
+                if line
+                    .jobs
+                    .iter()
+                    .any(|job| job.record.result.metrics.contains_key(&quantity.name))
+                {
+                    "undefined"
+                } else {
+                    "absent"
+                }
+                .into(),
+            ),
+        }
+    } else {
+        let (mean, deviation) = mean_and_deviation(&values);
+        Content::Figure {
+            value: mean,
+            digits: quantity.digits,
+            spread: (line.jobs.len() > 1).then_some((deviation, values.len())),
+        }
+    };
+    Cell {
+        content,
+        best: false,
+        mark,
+    }
+}
+
+/// The word that stands for a job without a figure.
+pub fn word(row: &Row) -> &str {
+    let result = &row.record.result;
+    match (result.stop.is_empty(), result.status) {
+        (false, _) => &result.stop,
+        (true, Status::Skipped) => "skipped",
+        (true, Status::Failed) => "failed",
+        (true, Status::Refused) => "refused",
+        (true, Status::Done) => "absent",
+    }
+}
+
+fn note(job: &Row, jobs: usize) -> String {
+    let result = &job.record.result;
+    let who = if jobs > 1 {
+        format!("{}: ", job.name)
+    } else {
+        String::new()
+    };
+    if result.reason.is_empty() {
+        format!("{who}{}", word(job))
+    } else {
+        format!("{who}{}: {}", word(job), result.reason)
+    }
+}
+
+/// Mean and sample standard deviation; the latter is 0 for a single value.
+pub fn mean_and_deviation(values: &[f64]) -> (f64, f64) {
+    let count = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / count;
+    if values.len() < 2 {
+        return (mean, 0.0);
+    }
+    let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
+    (mean, (squares / (count - 1.0)).sqrt())
+}
+
+/// Marks the best figure of each group: the lines that differ in the last row axis only.
+fn best_figures(lines: &[Line], quantities: &[Quantity]) -> Vec<Vec<bool>> {
+    let mut best = vec![vec![false; quantities.len()]; lines.len()];
+    for (column, quantity) in quantities.iter().enumerate() {
+        let sign = match quantity.better {
+            Better::Lower => 1.0,
+            Better::Higher => -1.0,
+            Better::Neither => continue,
+        };
+        let mut groups: BTreeMap<String, Vec<(usize, f64)>> = BTreeMap::new();
+        for (index, line) in lines.iter().enumerate() {
+            let values = figures(line, &quantity.name);
+            if values.is_empty() || line.jobs.iter().any(|job| !job.done()) {
+                continue;
+            }
+            let fixed = line.axes.len().saturating_sub(1);
+            let group = line.axes[..fixed]
+                .iter()
+                .map(|value| value.map_or_else(String::new, |value| value.to_string()));
+            groups
+                .entry(group.collect::<Vec<_>>().join("\n"))
+                .or_default()
+                .push((index, sign * mean_and_deviation(&values).0));
+        }
+        for group in groups.values() {
+            let lowest = group.iter().map(|entry| entry.1).fold(f64::INFINITY, f64::min);
+            let winners = group.iter().filter(|entry| entry.1 == lowest).count();
+            // A column in which all are equal has no best.
+            if winners < group.len() {
+                for (index, value) in group {
+                    best[*index][column] = *value == lowest;
+                }
+            }
+        }
+    }
+    best
+}
+
+/// A printed figure.
+struct Printed {
+    value: f64,
+    text: String,
+    tolerance: f64,
+}
+
+impl Printed {
+    /// Half a unit of the last printed digit: a difference below it is no difference.
+    fn half_unit(&self) -> f64 {
+        let mantissa = self.text.split(['e', 'E']).next().unwrap_or("");
+        let decimals = mantissa.split_once('.').map_or(0, |(_, digits)| digits.len());
+        let exponent: i32 = self
+            .text
+            .split(['e', 'E'])
+            .nth(1)
+            .and_then(|text| text.parse().ok())
+            .unwrap_or(0);
+        0.5 * 10f64.powi(exponent - decimals as i32)
+    }
+
+    fn compare(&self, ours: f64, quantity: &Quantity) -> Content {
+        let difference = ours - self.value;
+        if quantity.measured {
+            let ratio = ours / self.value;
+            let text = if ratio.is_finite() {
+                format!("\u{d7}{}", super::number::round(ratio, 2).unicode())
+            } else {
+                String::new()
+            };
+            return Content::Difference {
+                text,
+                judgement: Judgement::Ratio,
+            };
+        }
+        let within = difference.abs() <= (self.tolerance * self.value.abs()).max(self.half_unit());
+        let judgement = match quantity.better {
+            _ if within => Judgement::Within,
+            Better::Neither => Judgement::Differs,
+            Better::Lower if difference < 0.0 => Judgement::Better,
+            Better::Higher if difference > 0.0 => Judgement::Better,
+            _ => Judgement::Worse,
+        };
+        let relative = difference / self.value.abs();
+        let text = if !difference.is_finite() || self.value == 0.0 {
+            let rounded = super::number::round(difference, 3).unicode();
+            if difference > 0.0 {
+                format!("+{rounded}")
+            } else {
+                rounded
+            }
+        } else if relative > 1.0 {
+            format!("\u{d7}{}", super::number::round(ours / self.value, 3).unicode())
+        } else {
+            let rounded = format!("{:+.1} %", 100.0 * relative).replace('-', "\u{2212}");
+            if matches!(rounded.as_str(), "+0.0 %" | "\u{2212}0.0 %") {
+                "0.0 %".into()
+            } else {
+                rounded
+            }
+        };
+        Content::Difference { text, judgement }
+    }
+}
+
+fn printed_figures(table: &Table, line: &Line) -> Vec<Option<Printed>> {
+    let none = || table.columns.iter().map(|_| None).collect();
+    let (Some(published), Some(job)) = (&table.published, line.jobs.first()) else {
+        return none();
+    };
+    let is_column = |name: &str| table.columns.iter().any(|column| column == name);
+    let row = published.rows.iter().find(|row| {
+        row.iter()
+            .filter(|(name, _)| !is_column(name) && name.as_str() != "tolerance")
+            .all(|(name, value)| job.axis(name).is_some_and(|own| same(own, value)))
+    });
+    let Some(row) = row else { return none() };
+    let tolerance = row.get("tolerance").and_then(Value::as_f64).unwrap_or(TOLERANCE);
+    let printed = |column: &String| {
+        let value = row.get(column)?;
+        Some(Printed {
+            value: value.as_f64()?,
+            text: value.to_string(),
+            tolerance,
+        })
+    };
+    table.columns.iter().map(printed).collect()
+}
+
+fn legend(table: &Table, quantities: &[Quantity], lines: &[Line], any_best: bool) -> Vec<String> {
+    let mut legend = Vec::new();
+    if quantities.iter().any(|quantity| quantity.measured) {
+        legend.push("Figures to four significant digits, measurements to three; jobs.csv holds them unrounded.".into());
+    } else {
+        legend.push("Figures to four significant digits; jobs.csv holds them unrounded.".into());
+    }
+    if any_best {
+        legend.push(match table.rows.as_slice() {
+            [] | [_] => "Bold: the best of a column.".to_string(),
+            [fixed @ .., last] => {
+                format!("Bold: the best {last} of a column at equal {}.", fixed.join(" and "))
+            }
+        });
+    }
+    if lines.iter().any(|line| line.jobs.len() > 1) {
+        legend.push("A \u{b1} B (n): mean and sample standard deviation of n jobs.".into());
+    }
+    if let Some(published) = &table.published {
+        legend.push(source(published));
+        legend.push(format!(
+            "A difference within {} % of the printed figure (or the row's own tolerance, or half its last digit) counts as equal.",
+            100.0 * TOLERANCE
+        ));
+        if quantities.iter().any(|quantity| quantity.measured) {
+            legend.push(match &published.machine {
+                Some(machine) => format!("Printed times: {machine}; ours against them is a ratio without judgement."),
+                None => "Printed times are of another machine: a ratio without judgement.".into(),
+            });
+        }
+    }
+    legend
+}
+
+fn source(published: &Published) -> String {
+    format!("Printed: {}.", published.source.trim_end_matches('.'))
+}

@@ -1,0 +1,183 @@
+//! The page holds everything, loads nothing, lets nothing through as markup, and is the same for the same records.
+
+use crate::sample;
+use serde_json::json;
+use std::path::Path;
+use vargeo::experiment::file::Experiment;
+use vargeo::experiment::record::Status;
+use vargeo::report::{self, Row};
+
+fn written(experiment: &Experiment, rows: &[Row]) -> String {
+    let folder = tempfile::tempdir().unwrap();
+    let written = report::write(experiment, rows, folder.path()).unwrap();
+    std::fs::read_to_string(written.page).unwrap()
+}
+
+/// Ten results of one mesh of 13,182 tetrahedra.
+fn ten() -> Vec<Row> {
+    (0..10)
+        .map(|index| {
+            let mut row = sample::rows().swap_remove(index % 4);
+            row.name = format!("ball-{index}");
+            row.axes = vec![
+                ("model".into(), json!("ball")),
+                ("energy".into(), json!(format!("energy {index}"))),
+            ];
+            row.mesh = Some(sample::mesh(13, 0.15 * index as f64));
+            row
+        })
+        .collect()
+}
+
+/// Every start tag has its end tag in the right order.
+fn assert_well_formed(page: &str) {
+    const VOID: [&str; 5] = ["meta", "img", "input", "br", "!doctype"];
+    let mut open: Vec<&str> = Vec::new();
+    let mut rest = page;
+    while let Some(start) = rest.find('<') {
+        rest = &rest[start + 1..];
+        let end = rest.find('>').expect("a tag ends");
+        let tag = &rest[..end];
+        rest = &rest[end + 1..];
+        let name = tag.trim_start_matches('/').split([' ', '/']).next().unwrap();
+        if let Some(name) = tag.strip_prefix('/') {
+            assert_eq!(open.pop(), Some(name), "at {}", &rest[..rest.len().min(80)]);
+        } else if !tag.ends_with('/') && !VOID.contains(&name) {
+            open.push(name);
+            if name == "script" || name == "style" {
+                let close = rest.find(&format!("</{name}")).expect("raw text ends");
+                rest = &rest[close..];
+            }
+        }
+    }
+    assert!(open.is_empty(), "left open: {open:?}");
+}
+
+#[test]
+fn ten_meshes_stay_below_a_megabyte() {
+    let page = written(&sample::experiment(), &ten());
+    assert_well_formed(&page);
+    assert!(page.len() < 1 << 20, "{} bytes", page.len());
+    assert_eq!(page.matches("id=\"job-").count(), 10);
+    assert_eq!(page.matches("id=\"mesh-").count(), 1, "one mesh is stored once");
+    assert_eq!(page.matches("src=\"data:image/png;base64,").count(), 10);
+    assert!(
+        !page.contains("src=\"http") && !page.contains("<link"),
+        "nothing is loaded"
+    );
+}
+
+#[test]
+fn every_end_of_a_job_has_its_place() {
+    let page = written(&sample::experiment(), &sample::rows());
+    assert_well_formed(&page);
+    for text in [
+        "time-limit",
+        "stopped after 600 s",
+        "infeasible",
+        "boundary triangle 17",
+        "missing-model",
+        "step-limit",
+    ] {
+        assert!(page.contains(text), "{text}");
+    }
+    assert!(!page.contains("NaN") && !page.contains("nan<"));
+    assert!(!page.contains("<script"), "nothing to look at in three dimensions");
+}
+
+#[test]
+fn undefined_and_infinite_figures_are_words() {
+    let mut rows = sample::rows();
+    rows[0].record.result.metrics.insert("d_ma".into(), f64::NAN);
+    rows[1].record.result.metrics.insert("d_aa".into(), f64::INFINITY);
+    let page = written(&sample::experiment(), &rows);
+    assert!(!page.contains("NaN") && page.contains("undefined") && page.contains("infinite"));
+}
+
+#[test]
+fn text_cannot_become_markup() {
+    let evil = "</td><script>alert(1)</script>\"'&";
+    let mut experiment = sample::experiment();
+    experiment.title = evil.into();
+    experiment.description = evil.into();
+    experiment.tables[0].title = Some(evil.into());
+    experiment.plots[0].title = Some(evil.into());
+    let mut rows = sample::rows();
+    for row in &mut rows {
+        row.record.result.reason = evil.into();
+        row.record.result.notices = vec![evil.into()];
+        row.record.measurement.host = evil.into();
+        row.axes[0].1 = json!(evil);
+    }
+    rows[0].mesh = Some(sample::mesh(2, 0.1));
+    rows[1].mesh = Some(format!("no mesh {evil}").into_bytes());
+    let page = written(&experiment, &rows);
+    assert_well_formed(&page);
+    assert!(!page.contains("alert(1)</script>"));
+    assert!(page.contains("cannot be shown"));
+}
+
+#[test]
+fn the_same_records_give_the_same_bytes() {
+    let read = |folder: &Path| {
+        let mut files: Vec<_> = std::fs::read_dir(folder)
+            .unwrap()
+            .map(|entry| entry.unwrap().path())
+            .collect();
+        files.sort();
+        files
+            .iter()
+            .map(|file| (file.file_name().unwrap().to_owned(), std::fs::read(file).unwrap()))
+            .collect::<Vec<_>>()
+    };
+    let mut rows = sample::rows();
+    rows[1].mesh = Some(sample::mesh(4, 0.4));
+    let (first, second) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    report::write(&sample::experiment(), &rows, first.path()).unwrap();
+    for row in &mut rows {
+        row.cached = true;
+    }
+    report::write(&sample::experiment(), &rows, second.path()).unwrap();
+    let files = read(first.path());
+    assert!(files == read(second.path()));
+    let names: Vec<_> = files.iter().map(|file| file.0.to_str().unwrap()).collect();
+    insta::assert_snapshot!("files", names.join(" "));
+}
+
+#[test]
+fn no_jobs_give_a_page_all_the_same() {
+    let page = written(&sample::experiment(), &[]);
+    assert_well_formed(&page);
+    assert!(page.contains("no job matches"));
+}
+
+/// Writes a page to look at: `cargo test --test tests page::to_look_at -- --ignored`.
+#[test]
+#[ignore = "for eyes"]
+fn to_look_at() {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("page");
+    let mut experiment = sample::experiment();
+    let mut rows = sample::rows();
+    for (index, row) in rows.iter_mut().enumerate() {
+        if row.record.result.status == Status::Done {
+            row.mesh = Some(sample::mesh(13, 0.5 * index as f64));
+        }
+    }
+    let (mut study, rate) = sample::study();
+    let mut plot = experiment.plots[0].clone();
+    plot.name = "convergence".into();
+    plot.title = Some("Error against h".into());
+    (plot.x, plot.y) = ("h".into(), "error".into());
+    plot.series = vec!["family".into()];
+    (plot.log_x, plot.log_y) = (true, true);
+    plot.condition = sample::condition(&[("family", &[json!("even"), json!("random")])]);
+    experiment.plots.push(plot);
+    experiment.rates.push(vargeo::experiment::file::Rate {
+        condition: sample::condition(&[("family", &[json!("even"), json!("random")])]),
+        ..rate
+    });
+    rows.append(&mut study);
+    experiment.tables[0].condition = sample::condition(&[("model", &[json!("ball"), json!("duck"), json!("horse")])]);
+    report::write(&experiment, &rows, &folder).unwrap();
+    println!("{}", folder.display());
+}

@@ -1,0 +1,175 @@
+//! Tables, macros, plots and the comparison of two result sets, by snapshot.
+
+use crate::sample;
+use serde_json::json;
+use vargeo::experiment::file::{Condition, Plot, Table};
+use vargeo::report::table::{build, csv, latex, markdown, terminal};
+use vargeo::report::{compare, jobs, macros, number, plot};
+
+#[test]
+fn numbers_round_to_significant_digits() {
+    let plain: Vec<String> = [
+        0.0,
+        1.0,
+        -12.34567,
+        0.000_123_456,
+        0.001_234_56,
+        999.96,
+        123_456.7,
+        1.5e6,
+        12_345_678.9,
+        -0.0,
+        2_464.0,
+    ]
+    .iter()
+    .map(|&value| number::round(value, 4).plain())
+    .collect();
+    insta::assert_snapshot!("rounded", plain.join(" "));
+    assert_eq!(
+        number::round(-1.234e-7, 3).unicode(),
+        "\u{2212}1.23\u{d7}10\u{207b}\u{2077}"
+    );
+    assert_eq!(number::round(-1.234e-7, 3).latex(), "$-1.23\\cdot 10^{-7}$");
+    assert_eq!(number::round(f64::NAN, 3).plain(), "undefined");
+    assert_eq!(number::bytes(123 << 20), "123 MiB");
+}
+
+#[test]
+fn a_table_in_every_form() {
+    let experiment = sample::experiment();
+    let grid = build(&experiment, &experiment.tables[0], &sample::rows());
+    insta::assert_snapshot!("markdown", markdown::write(&grid));
+    insta::assert_snapshot!("csv", String::from_utf8(csv::write(&grid).unwrap()).unwrap());
+    insta::assert_snapshot!("latex", latex::write(&grid));
+    insta::assert_snapshot!("terminal", terminal::write(&grid, None));
+}
+
+#[test]
+fn several_jobs_in_a_row_give_mean_and_deviation() {
+    let (rows, _) = sample::study();
+    let table = Table {
+        name: "study".into(),
+        title: None,
+        rows: vec!["family".into(), "h".into()],
+        columns: vec!["error".into()],
+        condition: sample::condition(&[("family", &[json!("even")])]),
+        published: None,
+    };
+    let grid = build(&sample::experiment(), &table, &rows);
+    insta::assert_snapshot!("deviation", markdown::write(&grid));
+}
+
+#[test]
+fn jobs_csv_has_a_row_a_job_unrounded() {
+    let text = String::from_utf8(jobs::write(&sample::experiment(), &sample::rows()).unwrap()).unwrap();
+    insta::assert_snapshot!("jobs", text);
+}
+
+#[test]
+fn macros_define_every_figure() {
+    let text = macros::write(&sample::experiment(), &sample::rows()[..1], &[]);
+    insta::assert_snapshot!("macros", text);
+}
+
+fn plot(x: &str, y: &str, log: bool) -> Plot {
+    Plot {
+        name: "plot".into(),
+        title: None,
+        x: x.into(),
+        y: y.into(),
+        series: vec!["family".into()],
+        log_x: log,
+        log_y: log,
+        condition: Condition::new(),
+    }
+}
+
+#[test]
+fn logarithmic_axes_have_labelled_decades() {
+    let (rows, _) = sample::study();
+    let chart = plot::chart(&sample::experiment(), &plot("h", "error", true), &rows);
+    let labels: Vec<&str> = chart.y.ticks.iter().filter_map(|tick| tick.label.as_deref()).collect();
+    assert_eq!(labels, ["10\u{207b}\u{b3}", "10\u{207b}\u{b2}", "10\u{207b}\u{b9}"]);
+    let svg = plot::svg::standalone(&chart).unwrap();
+    for label in labels {
+        assert!(svg.contains(&format!(">{label}</text>")), "{label}");
+    }
+}
+
+#[test]
+fn short_logarithmic_axes_have_ticks_all_the_same() {
+    for (low, high) in [(2.0, 7.0), (6.31, 6.34), (0.9, 1.1), (3.0, 3.0), (1e-30, 1e30)] {
+        let axis = plot::axis::Axis::new(
+            String::new(),
+            plot::axis::Kind::Logarithmic,
+            [low, high].into_iter(),
+            false,
+        );
+        let labelled = axis.ticks.iter().filter(|tick| tick.label.is_some()).count();
+        assert!((2..=10).contains(&labelled), "{low} to {high}: {labelled} labels");
+        assert!(
+            axis.ticks
+                .iter()
+                .all(|tick| (-1e-6..1.000_001).contains(&axis.position(tick.value)))
+        );
+    }
+}
+
+#[test]
+fn series_are_told_apart_without_colour() {
+    let chart = plot::chart(&sample::experiment(), &sample::experiment().plots[0], &sample::rows());
+    assert_eq!(chart.series.len(), 4);
+    assert!(chart.series.iter().all(|series| series.phases == [8.0]));
+    let svg = plot::svg::standalone(&chart).unwrap();
+    // The second series is dashed: its path begins anew for each dash; every series has its own kind of marker and its name.
+    let path = |index: usize| {
+        svg.split(&format!("<path class=\"s{index}\" stroke-width=\"9\" d=\""))
+            .nth(1)
+            .unwrap()
+            .split('"')
+            .next()
+            .unwrap()
+    };
+    assert_eq!(path(0).matches('M').count(), 1);
+    assert!(path(1).matches('M').count() > 20);
+    assert!(svg.contains("<circle class=\"f0\"") && svg.contains("<polygon class=\"f1\""));
+    for series in &chart.series {
+        assert!(svg.contains(&format!(">{}</text>", series.name)));
+    }
+    assert!(svg.contains("prefers-color-scheme:dark") && !svg.contains("NaN"));
+}
+
+#[test]
+fn what_cannot_be_shown_on_a_plot_is_told() {
+    let (mut rows, _) = sample::study();
+    rows[3].record.result.metrics.insert("error".into(), -1.0);
+    rows[4].record.result.metrics.insert("error".into(), f64::NAN);
+    rows[5].record.result.metrics.clear();
+    rows.truncate(6);
+    let chart = plot::chart(&sample::experiment(), &plot("h", "error", true), &rows);
+    let notes = chart.notes.join(" ");
+    assert!(
+        notes.contains("2 points are not shown") && notes.contains("even-2-0"),
+        "{notes}"
+    );
+    let empty = plot::chart(&sample::experiment(), &plot("h", "error", true), &[]);
+    assert!(plot::svg::standalone(&empty).is_ok() && plot::bitmap::write(&empty).is_ok());
+    assert!(empty.notes.join(" ").contains("nothing to show"));
+}
+
+#[test]
+fn two_result_sets_side_by_side() {
+    let experiment = sample::experiment();
+    let left = sample::rows();
+    let mut right = sample::rows();
+    right.remove(5);
+    right[0].record.result.metrics.insert("d_ma".into(), 280.0);
+    right[1].record.measurement.wall_seconds = vec![0.5];
+    right[3].record.result.stop = "stalled".into();
+    let sheet = |rows: &[_]| compare::Sheet::read(&jobs::write(&experiment, rows).unwrap()).unwrap();
+    let comparison = compare::compare(&sheet(&left), &sheet(&right));
+    assert!(!comparison.same() && comparison.results().count() == 2);
+    insta::assert_snapshot!("comparison", compare::describe(&comparison, "before", "after"));
+    assert!(compare::compare(&sheet(&left), &sheet(&left)).same());
+    assert!(compare::Sheet::read(b"a,b\n1,2\n").is_err());
+}

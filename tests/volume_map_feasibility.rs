@@ -1,0 +1,173 @@
+//! Obstacles to maps without inversions: found where they are planted, named, and split away where a split helps.
+
+use serde_json::json;
+use vargeo::mesh::TetrahedralMesh;
+use vargeo::mesh::connectivity::{self, NONE};
+use vargeo::mesh::generate;
+use vargeo::mesh::target::{self, Target};
+use vargeo::method::volume_map::feasibility::{self, planar_faces};
+use vargeo::method::volume_map::problem::Problem;
+use vargeo::method::volume_map::settings::Settings;
+use vargeo::method::volume_map;
+use vargeo::optimize::Silent;
+
+fn settings(value: serde_json::Value) -> Settings {
+    Settings::resolve(&value).expect("valid settings")
+}
+
+/// A generated mesh and positions of its boundary vertices on a shape, zero inside.
+fn on_shape(generator: &str, parameters: serde_json::Value, shape: &str) -> (TetrahedralMesh, Vec<[f64; 3]>) {
+    let generated = generate::generate(generator, &parameters).expect("a mesh");
+    let boundary = connectivity::boundary(&generated.mesh.cells, generated.mesh.points.len());
+    let target = target::shape(shape, &json!({}), &generated.mesh, &boundary, generated.natural.as_deref()).expect("a target");
+    let mut positions = vec![[0.0; 3]; generated.mesh.points.len()];
+    for (&vertex, &position) in boundary.vertices.iter().zip(&target.positions) {
+        positions[vertex as usize] = position;
+    }
+    (generated.mesh, positions)
+}
+
+fn target_of(mesh: &TetrahedralMesh, positions: &[[f64; 3]]) -> Target {
+    let boundary = connectivity::boundary(&mesh.cells, mesh.points.len());
+    Target { positions: boundary.vertices.iter().map(|&v| positions[v as usize]).collect(), interior: None }
+}
+
+#[test]
+fn planar_faces_of_a_cube_are_six_and_a_sphere_has_none_that_matter() {
+    let (mesh, positions) = on_shape("bumpy", json!({ "tetrahedra": 3000 }), "cube");
+    let boundary = connectivity::boundary(&mesh.cells, mesh.points.len());
+    let faces = planar_faces(&boundary.triangles, &positions);
+    assert_eq!(faces.count, 6);
+    assert!(faces.of_triangle.iter().all(|&face| face != NONE));
+    // Turned out of the axes, and with one corner cut off by a plane, nothing changes but the count.
+    let (sine, cosine) = 0.4f64.sin_cos();
+    let turned: Vec<[f64; 3]> = positions
+        .iter()
+        .map(|&[x, y, z]| [cosine * x - sine * y, sine * x + cosine * y, z])
+        .map(|[x, y, z]| [x, cosine * y - sine * z, sine * y + cosine * z])
+        .collect();
+    assert_eq!(planar_faces(&boundary.triangles, &turned).count, 6);
+    assert_eq!(feasibility::check(&mesh, &boundary, &turned).lower_bound, 0);
+
+    let (mesh, positions) = on_shape("ball", json!({ "tetrahedra": 3000 }), "sphere");
+    let boundary = connectivity::boundary(&mesh.cells, mesh.points.len());
+    let obstacles = feasibility::check(&mesh, &boundary, &positions);
+    assert!(obstacles.inverted_triangles.is_empty() && obstacles.flat_triangles.is_empty() && !obstacles.forbid());
+}
+
+#[test]
+fn a_triangle_turned_over_is_named_and_bounds_the_inversions() {
+    let (mesh, mut positions) = on_shape("cube", json!({ "tetrahedra": 3000 }), "cube");
+    let boundary = connectivity::boundary(&mesh.cells, mesh.points.len());
+    assert!(!feasibility::check(&mesh, &boundary, &positions).forbid());
+    // A vertex in the middle of the top moves across one of its triangles, past the opposite edge.
+    let (index, triangle) = boundary
+        .triangles
+        .iter()
+        .enumerate()
+        .find(|(_, triangle)| {
+            triangle.iter().all(|&v| {
+                let [x, y, z] = positions[v as usize];
+                z == 1.0 && x > 0.2 && x < 0.8 && y > 0.2 && y < 0.8
+            })
+        })
+        .map(|(index, triangle)| (index, *triangle))
+        .expect("a triangle inside the top");
+    let [a, b, c] = triangle.map(|v| positions[v as usize]);
+    let middle = [(b[0] + c[0]) / 2.0, (b[1] + c[1]) / 2.0];
+    positions[triangle[0] as usize] =
+        [a[0] + 1.2 * (middle[0] - a[0]), a[1] + 1.2 * (middle[1] - a[1]), 1.0];
+    let obstacles = feasibility::check(&mesh, &boundary, &positions);
+    assert!(obstacles.inverted_triangles.contains(&triangle), "{obstacles:?}");
+    assert!(obstacles.lower_bound >= 1 && obstacles.lower_bound <= obstacles.inverted_triangles.len());
+
+    let chosen = settings(json!({ "energy": "stretch" }));
+    let problem = Problem::from_parts(mesh.clone(), target_of(&mesh, &positions), &chosen, Vec::new()).unwrap();
+    let failure = volume_map::run(&problem, &chosen, &mut Silent).expect_err("refused");
+    assert_eq!(failure.kind, "infeasible");
+    let name = format!("{triangle:?}");
+    assert!(failure.reason.contains(&name) && failure.reason.contains("at least"), "{}", failure.reason);
+
+    // Told to go on, exactly the forced ones stay inverted, and the outcome says so.
+    let chosen = settings(json!({ "energy": "stretch", "on_infeasible": "continue", "untangling": { "steps": 40 } }));
+    let outcome = volume_map::run(&problem, &chosen, &mut Silent).expect("a map");
+    assert_eq!(outcome.stop, "stalled", "{}", outcome.reason);
+    assert_eq!(outcome.metrics["inverted"], problem.obstacles.lower_bound as f64);
+    let cell = problem.boundary.cells[index];
+    assert!(outcome.reason.contains(&cell.to_string()), "{}", outcome.reason);
+
+    // A flattened triangle counts as well.
+    positions[triangle[0] as usize] = [middle[0], middle[1], 1.0];
+    let flat = feasibility::check(&mesh, &boundary, &positions);
+    assert!(flat.flat_triangles.contains(&triangle) || flat.inverted_triangles.contains(&triangle));
+}
+
+/// Two tetrahedra glued to the sides of an edge, and a third pair below, so that one interior edge joins two vertices of
+/// the top of a prism-like solid.
+#[test]
+fn edges_and_tetrahedra_that_leave_no_room_are_split() {
+    // A Kuhn cube: all eight vertices on the boundary, its diagonal inside, every tetrahedron with four boundary vertices.
+    let corner = |i: u32| [f64::from(i & 1), f64::from(i >> 1 & 1), f64::from(i >> 2 & 1)];
+    let mesh = TetrahedralMesh {
+        points: (0..8).map(corner).collect(),
+        cells: vec![[0, 1, 3, 7], [0, 1, 7, 5], [0, 5, 7, 4], [0, 3, 2, 7], [0, 2, 6, 7], [0, 6, 4, 7]]
+            .into_iter()
+            .map(|[a, b, c, d]: [u32; 4]| {
+                let positive = vargeo::mesh::determinant([a, b, c, d].map(corner)) > 0.0;
+                if positive { [a, b, c, d] } else { [a, c, b, d] }
+            })
+            .collect(),
+    };
+    let boundary = connectivity::boundary(&mesh.cells, 8);
+    assert!(!feasibility::check(&mesh, &boundary, &mesh.points).forbid(), "the identity needs no split");
+    // Corner 7 goes to the plane of the bottom, outside the square: the diagonal 0-7 lies in the bottom's plane.
+    let mut positions = mesh.points.clone();
+    for vertex in 4..8usize {
+        positions[vertex][2] = 1.0;
+    }
+    positions[7] = [0.4, 0.4, 1.0];
+    let obstacles = feasibility::check(&mesh, &boundary, &positions);
+    assert!(!obstacles.tetrahedra.is_empty() || !obstacles.inverted_triangles.is_empty(), "{obstacles:?}");
+    let before = obstacles.tetrahedra.len();
+    let mut moved = positions.clone();
+    let (refined, splits) = feasibility::split_needed(&mesh, &mut moved, |_| {});
+    assert!(splits.edges + splits.tetrahedra > 0 || before == 0, "{splits:?}");
+    assert_eq!(moved.len(), refined.points.len());
+    let boundary = connectivity::boundary(&refined.cells, refined.points.len());
+    assert!(feasibility::check(&refined, &boundary, &moved).tetrahedra.is_empty());
+    assert!((refined.volume() - 1.0).abs() < 1e-14);
+}
+
+#[test]
+fn an_interior_edge_within_a_planar_face_is_found_and_split() {
+    // A double pyramid over the square a, b, c, d with apexes up and down, cut along the diagonal a-c by the axis: the
+    // target flattens the upper half, so that the interior diagonal lies in the flat top.
+    let points = vec![
+        [-1.0, -1.0, 0.0],
+        [1.0, -1.0, 0.0],
+        [1.0, 1.0, 0.0],
+        [-1.0, 1.0, 0.0],
+        [0.0, 0.0, 1.0],
+        [0.0, 0.0, -1.0],
+    ];
+    let around = [[0u32, 1, 2, 4], [0, 2, 3, 4], [0, 2, 1, 5], [0, 3, 2, 5]];
+    let mesh = TetrahedralMesh { points: points.clone(), cells: around.to_vec() };
+    assert!(mesh.volumes().iter().all(|&volume| volume > 0.0));
+    let mut positions = points;
+    positions[4] = [0.2, 0.1, 0.0];
+    let boundary = connectivity::boundary(&mesh.cells, 6);
+    let obstacles = feasibility::check(&mesh, &boundary, &positions);
+    assert_eq!(obstacles.edges, [[0, 2]], "{obstacles:?}");
+    assert_eq!(obstacles.tetrahedra, [0, 1], "flattened onto the top");
+    let chosen = settings(json!({ "energy": "stretch", "split": "none" }));
+    let problem = Problem::from_parts(mesh.clone(), target_of(&mesh, &positions), &chosen, Vec::new()).unwrap();
+    let failure = volume_map::run(&problem, &chosen, &mut Silent).expect_err("refused");
+    assert!(failure.kind == "infeasible" && failure.reason.contains("split = \"needed\""), "{}", failure.reason);
+
+    let chosen = settings(json!({ "energy": "stretch" }));
+    let problem = Problem::from_parts(mesh.clone(), target_of(&mesh, &positions), &chosen, Vec::new()).unwrap();
+    assert_eq!(problem.splits.edges, 1);
+    let outcome = volume_map::run(&problem, &chosen, &mut Silent).expect("a map");
+    assert_eq!((outcome.stop.as_str(), outcome.metrics["inverted"]), ("converged", 0.0), "{}", outcome.reason);
+    assert!(outcome.notices.iter().any(|notice| notice.contains("split 1 interior edges")));
+}

@@ -52,7 +52,7 @@ pub struct Bounds<'a> {
 /// Reads the files of a job and checks that they are those that it was planned with.
 ///
 /// The error is a result with status `failed` and the word `input-unreadable` or `input-changed`.
-pub fn load(job: &Job, inputs: &BTreeMap<String, PathBuf>) -> Result<LoadedModel, JobResult> {
+pub fn load(job: &Job, inputs: &BTreeMap<String, PathBuf>) -> Result<LoadedModel, Box<JobResult>> {
     let mut model = LoadedModel::default();
     for (role, part) in &job.model {
         let part = match part {
@@ -66,19 +66,23 @@ pub fn load(job: &Job, inputs: &BTreeMap<String, PathBuf>) -> Result<LoadedModel
                 ..
             } => {
                 let Some(path) = inputs.get(role) else {
-                    return Err(failure("input-unreadable", format!("no file was given for {role}")));
+                    return Err(Box::new(failure("input-unreadable", format!("no file was given for {role}"))));
                 };
-                let bytes = std::fs::read(path)
-                    .map_err(|error| failure("input-unreadable", format!("cannot read {}: {error}", path.display())))?;
+                let bytes = std::fs::read(path).map_err(|error| {
+                    Box::new(failure(
+                        "input-unreadable",
+                        format!("cannot read {}: {error}", path.display()),
+                    ))
+                })?;
                 let found = sha256(&bytes);
                 if found != *planned {
-                    return Err(failure(
+                    return Err(Box::new(failure(
                         "input-changed",
                         format!(
                             "{} changed after the run was planned (SHA-256 {planned} then, {found} now); run again",
                             path.display()
                         ),
-                    ));
+                    )));
                 }
                 Part::File {
                     // The bare name: a record says nothing of the folders of a machine.

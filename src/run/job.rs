@@ -161,7 +161,7 @@ fn compute(
     };
     let model = match load(&request.job, &request.inputs) {
         Ok(model) => model,
-        Err(result) => return without(result),
+        Err(result) => return without(*result),
     };
     let bounds = Bounds {
         effort: request.effort,

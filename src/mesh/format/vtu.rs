@@ -695,13 +695,14 @@ pub fn write(
     write_array(&mut out, "Points", "Float64", 3, coordinates);
     out.push_str("</Points>\n<Cells>\n");
     let corners = cells.iter().flat_map(|(_, corners)| corners);
-    write_array(
-        &mut out,
-        "connectivity",
-        "Int64",
-        1,
-        corners.flat_map(|&corner| i64::from(corner).to_le_bytes()),
-    );
+    // VTK takes the type that the file names; half the bytes where indices fit.
+    if points.len() <= i32::MAX as usize {
+        let bytes = corners.flat_map(|&corner| (corner as i32).to_le_bytes());
+        write_array(&mut out, "connectivity", "Int32", 1, bytes);
+    } else {
+        let bytes = corners.flat_map(|&corner| i64::from(corner).to_le_bytes());
+        write_array(&mut out, "connectivity", "Int64", 1, bytes);
+    }
     let offsets = cells.iter().scan(0_i64, |end, (_, corners)| {
         *end += corners.len() as i64;
         Some(*end)
@@ -728,7 +729,7 @@ fn write_array(out: &mut String, name: &str, kind: &str, components: usize, byte
     let mut packed = Vec::with_capacity(bytes.len() / 2);
     for block in bytes.chunks(BLOCK) {
         let before = packed.len();
-        let mut encoder = flate2::write::ZlibEncoder::new(packed, flate2::Compression::default());
+        let mut encoder = flate2::write::ZlibEncoder::new(packed, flate2::Compression::fast());
         let written = encoder.write_all(block).and_then(|()| encoder.finish());
         packed = written.expect("memory takes every byte");
         header.push((packed.len() - before) as u64);

@@ -21,6 +21,7 @@ pub fn minimize(
         stopping: Stopping {
             gradient_norm: settings.gradient_tolerance,
             relative_decrement: settings.energy_tolerance,
+            relative_change: settings.change_tolerance,
             iterations: settings.iterations,
             ..Stopping::default()
         },

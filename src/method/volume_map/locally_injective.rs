@@ -79,12 +79,9 @@ pub fn minimize(
         let evaluation = objective.describe(&x);
         trace.record(&iterate, &evaluation);
         observer.iterate(&iterate);
-        let tolerance = settings.gradient_tolerance * weight.max(1.0);
-        if gradient_norm < tolerance {
-            break (
-                StopReason::Converged,
-                format!("gradient norm {gradient_norm:.3e} is below {tolerance:.3e}"),
-            );
+        let (balanced, tolerance) = (objective.balanced_norm(&gradient), settings.gradient_tolerance);
+        if balanced < tolerance {
+            break (StopReason::Converged, format!("balanced gradient norm {balanced:.3e} is below {tolerance:.3e}"));
         }
         let change = before.map_or(f64::INFINITY, |before| before - value);
         if change.abs() < CHANGE * value.abs() {

@@ -6,8 +6,8 @@
 //! on; if the step is still refused it takes one by the energy alone. The weight may be raised from a small value, each
 //! time the method has converged off the target.
 //!
-//! Converged when the norm of the gradient, divided by the weight where that exceeds 1, or the change of the energy is
-//! small. Guaranteed: no tetrahedron is inverted if none was and the energy or the barrier forbids it. Not guaranteed:
+//! Converged when the norm of the gradient, its slopes at the boundary divided by the weight where that exceeds 1, or the
+//! change of the energy is small. Guaranteed: no tetrahedron is inverted if none was and the energy or the barrier forbids it. Not guaranteed:
 //! that the boundary reaches its target; the residual is reported.
 
 use super::objective::{MapObjective, Pull};
@@ -140,11 +140,8 @@ impl Run<'_> {
 
     /// Minimizes at one weight.
     fn at_weight(&mut self, problem: &Problem, settings: &Settings, weight: f64) -> (StopReason, String) {
-        self.objective.set_pull(Some(Pull {
-            weight,
-            targets: problem.targets.clone(),
-        }));
-        let tolerance = settings.gradient_tolerance * weight.max(1.0);
+        self.objective.set_pull(Some(Pull { weight, targets: problem.targets.clone() }));
+        let tolerance = settings.gradient_tolerance;
         let change = self.options.energy_tolerance * problem.source_diagonal();
         self.evaluations += 1;
         let mut value = self.objective.gradient(&self.x, &mut self.gradient);
@@ -159,10 +156,11 @@ impl Run<'_> {
                 );
             }
             self.tell(value, gradient_norm, step);
-            if gradient_norm < tolerance {
+            let balanced = self.objective.balanced_norm(&self.gradient);
+            if balanced < tolerance {
                 return (
                     StopReason::Converged,
-                    format!("gradient norm {gradient_norm:.3e} is below {tolerance:.3e} at weight {weight:.3e}"),
+                    format!("balanced gradient norm {balanced:.3e} is below {tolerance:.3e} at weight {weight:.3e}"),
                 );
             }
             if decrease < change {

@@ -106,7 +106,12 @@ impl Newton {
                         counters.evaluations += 1;
                         value = objective.gradient(&x, &mut gradient);
                         gradient_norm = norm(&gradient);
-                        observer.iterate(&Iterate { iteration: counters.iterations, energy: value, gradient_norm, step });
+                        observer.iterate(&Iterate {
+                            iteration: counters.iterations,
+                            energy: value,
+                            gradient_norm,
+                            step,
+                        });
                         break (StopReason::Converged, reason);
                     }
                 }

@@ -81,7 +81,10 @@ pub fn minimize(
         observer.iterate(&iterate);
         let (balanced, tolerance) = (objective.balanced_norm(&gradient), settings.gradient_tolerance);
         if balanced < tolerance {
-            break (StopReason::Converged, format!("balanced gradient norm {balanced:.3e} is below {tolerance:.3e}"));
+            break (
+                StopReason::Converged,
+                format!("balanced gradient norm {balanced:.3e} is below {tolerance:.3e}"),
+            );
         }
         let change = before.map_or(f64::INFINITY, |before| before - value);
         if change.abs() < CHANGE * value.abs() {

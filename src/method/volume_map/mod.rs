@@ -199,13 +199,19 @@ pub fn run(problem: &Problem, settings: &Settings, observer: &mut dyn Observer) 
         // Densities that grow exponentially overflow on badly shaped tetrahedra, of which a valid start may have some.
         observer.phase("approach");
         let approach = Density::new(&Mips);
-        let mapping = MappingEnergy::new(&problem.source, &problem.volume_weights(), approach, None)
-            .map_err(|error| Failure { kind: "invalid-input".to_string(), reason: format!("source mesh: {error}") })?;
+        let mapping =
+            MappingEnergy::new(&problem.source, &problem.volume_weights(), approach, None).map_err(|error| {
+                Failure {
+                    kind: "invalid-input".to_string(),
+                    reason: format!("source mesh: {error}"),
+                }
+            })?;
         let free: Vec<bool> = problem.boundary.mask.iter().map(|&on_boundary| !on_boundary).collect();
         let vertices = &problem.boundary.vertices;
         let mut objective =
             MapObjective::new(mapping, &problem.source, &free, vertices, &positions, Hessian::OnDemand)?;
-        let solution = projected_newton::minimize(&mut objective, settings, &positions, observer, &mut Trace::default());
+        let solution =
+            projected_newton::minimize(&mut objective, settings, &positions, observer, &mut Trace::default());
         positions = objective.positions(&solution.x);
         counters.set("approach_iterations", solution.counters.iterations);
         counters.add("factorizations", solution.counters.factorizations);
@@ -334,7 +340,10 @@ pub const COUNTERS: &[(&str, &str)] = &[
         "values of the regularization that the untangling went through",
     ),
     ("untangling_iterations", "Newton iterations of the untangling"),
-    ("approach_iterations", "Newton iterations on another energy, where the chosen one overflows on the start"),
+    (
+        "approach_iterations",
+        "Newton iterations on another energy, where the chosen one overflows on the start",
+    ),
     ("relaxations", "relaxations of the relaxed-newton solver"),
     (
         "weights",

@@ -182,7 +182,9 @@ impl MapObjective {
     /// convergence is judged by, since the springs' slopes are large while their displacements are small.
     pub fn balanced_norm(&self, gradient: &[f64]) -> f64 {
         let total: f64 = gradient.iter().map(|slope| slope * slope).sum();
-        let Some(pull) = self.pull.as_ref().filter(|pull| pull.weight > 1.0) else { return total.sqrt() };
+        let Some(pull) = self.pull.as_ref().filter(|pull| pull.weight > 1.0) else {
+            return total.sqrt();
+        };
         let (mut inside, mut pulled) = (0.0, 0.0);
         let mut next = self.boundary.iter().peekable();
         for (&vertex, slopes) in self.cholesky.pattern().vertices().iter().zip(gradient.chunks_exact(3)) {
@@ -298,7 +300,11 @@ impl Objective for MapObjective {
 
 impl NewtonObjective for MapObjective {
     fn newton_direction(&mut self, x: &[f64], gradient: &mut [f64], direction: &mut [f64]) -> Result<f64, NoDirection> {
-        let mut kept = if self.hessian == Hessian::OnDemand { self.kept } else { 0.0 };
+        let mut kept = if self.hessian == Hessian::OnDemand {
+            self.kept
+        } else {
+            0.0
+        };
         let mut first = true;
         let value = loop {
             let value = self.assemble(x, gradient, kept);
@@ -322,7 +328,11 @@ impl NewtonObjective for MapObjective {
                 }
             }
         }
-        self.kept = if first { (4.0 * kept).clamp(LEAST_KEPT, 1.0) } else { kept };
+        self.kept = if first {
+            (4.0 * kept).clamp(LEAST_KEPT, 1.0)
+        } else {
+            kept
+        };
         for (direction, slope) in direction.iter_mut().zip(&*gradient) {
             *direction = -slope;
         }

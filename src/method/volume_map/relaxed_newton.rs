@@ -140,7 +140,10 @@ impl Run<'_> {
 
     /// Minimizes at one weight.
     fn at_weight(&mut self, problem: &Problem, settings: &Settings, weight: f64) -> (StopReason, String) {
-        self.objective.set_pull(Some(Pull { weight, targets: problem.targets.clone() }));
+        self.objective.set_pull(Some(Pull {
+            weight,
+            targets: problem.targets.clone(),
+        }));
         let tolerance = settings.gradient_tolerance;
         let change = self.options.energy_tolerance * problem.source_diagonal();
         self.evaluations += 1;

@@ -395,8 +395,14 @@ pub static FIELDS: &[Field] = &[
 ];
 
 const HESSIANS: &[(&str, &str)] = &[
-    ("projected", "negative eigenvalues of each tetrahedron's Hessian are set to zero"),
-    ("on-demand", "as much of the negative curvature is kept as leaves the whole positive definite"),
+    (
+        "projected",
+        "negative eigenvalues of each tetrahedron's Hessian are set to zero",
+    ),
+    (
+        "on-demand",
+        "as much of the negative curvature is kept as leaves the whole positive definite",
+    ),
 ];
 
 fn energy_names() -> Vec<(&'static str, String)> {

@@ -409,9 +409,9 @@ fn same_bits_with_any_number_of_threads() {
     };
     for chosen in [
         json!({ "energy": "stretch" }),
-        json!({ "energy": "arap", "solver": "l-bfgs", "iterations": 30 }),
-        json!({ "energy": "stretch", "preset": "paper", "iterations": 20 }),
-        json!({ "energy": "arap", "preset": "paper", "solver": "locally-injective", "iterations": 10 }),
+        json!({ "energy": "arap", "solver": "l-bfgs", "iteration_limit": 30 }),
+        json!({ "energy": "stretch", "preset": "paper", "iteration_limit": 20 }),
+        json!({ "energy": "arap", "preset": "paper", "solver": "locally-injective", "iteration_limit": 10 }),
     ] {
         let one = run(1, chosen.clone());
         for threads in [2, 4] {
@@ -452,7 +452,7 @@ impl Observer for Impatient {
 #[test]
 fn every_solver_tells_why_it_stopped() {
     for solver in ["projected-newton", "relaxed-newton", "locally-injective", "l-bfgs"] {
-        let chosen = |iterations: u64| json!({ "energy": "stretch", "solver": solver, "iterations": iterations });
+        let chosen = |iterations: u64| json!({ "energy": "stretch", "solver": solver, "iteration_limit": iterations });
         let limited = map(twisted_grid(4), chosen(2), &mut Silent).expect("a map");
         assert_eq!(limited.stop, "step-limit", "{solver}: {}", limited.reason);
         assert_eq!(limited.counters["iterations"], 2);

@@ -68,7 +68,10 @@ impl Row {
         match name {
             "seconds" => median(&measurement.wall_seconds),
             "cpu_seconds" => median(&measurement.cpu_seconds),
-            "peak_memory" => Some(measurement.peak_memory as f64).filter(|bytes| *bytes > 0.0),
+            // Bytes in the record, MiB in tables.
+            "peak_memory" => {
+                Some(measurement.peak_memory as f64 / f64::from(1 << 20)).filter(|mebibytes| *mebibytes > 0.0)
+            }
             _ => None,
         }
     }

@@ -22,7 +22,7 @@ pub fn minimize(
             gradient_norm: settings.gradient_tolerance,
             relative_decrement: settings.energy_tolerance,
             relative_change: settings.change_tolerance,
-            iterations: settings.iterations,
+            iterations: settings.iteration_limit,
             ..Stopping::default()
         },
         memory: usize::try_from(settings.l_bfgs.memory).unwrap_or(usize::MAX),

@@ -96,10 +96,10 @@ pub fn minimize(
         if let Some(stop) = observer.stop() {
             break (stop, "stopped from outside".to_string());
         }
-        if iterations >= settings.iterations {
+        if iterations >= settings.iteration_limit {
             break (
                 StopReason::StepLimit,
-                format!("{} iterations were not enough", settings.iterations),
+                format!("{} iterations were not enough", settings.iteration_limit),
             );
         }
 

@@ -175,10 +175,10 @@ impl Run<'_> {
             if let Some(stop) = self.observer.stop() {
                 return (stop, "stopped from outside".to_string());
             }
-            if self.iterations >= settings.iterations {
+            if self.iterations >= settings.iteration_limit {
                 return (
                     StopReason::StepLimit,
-                    format!("{} iterations were not enough", settings.iterations),
+                    format!("{} iterations were not enough", settings.iteration_limit),
                 );
             }
             let mut update = self.update(self.options.gradient_criterion);

@@ -184,7 +184,7 @@ pub static FIELDS: &[Field] = &[
               Preset best: true, paper: false.",
     },
     Field {
-        name: "iterations",
+        name: "iteration_limit",
         kind: Kind::Integer { min: 0, max: 1_000_000 },
         default: Default::Integer(500),
         doc: "The largest number of iterations of the minimization.",
@@ -565,7 +565,7 @@ pub struct Settings {
     pub split: Split,
     pub on_infeasible: OnInfeasible,
     pub untangle: bool,
-    pub iterations: u64,
+    pub iteration_limit: u64,
     pub gradient_tolerance: f64,
     pub energy_tolerance: f64,
     pub change_tolerance: f64,

@@ -476,7 +476,8 @@ fn every_solver_tells_why_it_stopped() {
         }
     }
     // Quasi-Newton with a criterion beyond the reach of rounding runs until nothing moves.
-    let stuck = json!({ "energy": "arap", "gradient_tolerance": 0.0, "energy_tolerance": 0.0, "iterations": 100_000 });
+    let stuck =
+        json!({ "energy": "arap", "gradient_tolerance": 0.0, "energy_tolerance": 0.0, "iteration_limit": 100_000 });
     let stalled = map(twisted_grid(4), stuck, &mut Silent).expect("a map");
     assert_eq!(stalled.stop, "stalled", "{}", stalled.reason);
 }

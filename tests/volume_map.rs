@@ -208,7 +208,8 @@ fn similarity_fits_agree_with_stored_values() {
 }
 
 /// Rows of the published comparison: name, inverted, D_aa, D_ma, D_av, D_mv, mean Dirichlet, ARAP and stretch energy. A
-/// figure holds to half a unit of its last digit.
+/// figure holds to half a unit of its last digit. The last row is printed with D_ma 19.80 from a run that stopped at
+/// 19.8048; the same program taken to a gradient of 1e-10 gives 19.80543.
 #[test]
 fn comparison_of_energies_holds_to_the_printed_digits() {
     let rows: [(&str, Value, [&str; 8]); 10] = [
@@ -263,7 +264,7 @@ fn comparison_of_energies_holds_to_the_printed_digits() {
             "stretch",
             json!({ "solver": "relaxed-newton", "start": "similarity",
                     "relaxed-newton": { "continuation": "on", "energy_tolerance": 1e-14 } }),
-            ["0", "3.833", "19.80", "2.348", "8.23", "4.563", "1.013", "6.597"],
+            ["0", "3.833", "19.805", "2.348", "8.23", "4.563", "1.013", "6.597"],
         ),
     ];
     let columns = [
@@ -475,7 +476,8 @@ fn every_solver_tells_why_it_stopped() {
         }
     }
     // Quasi-Newton with a criterion beyond the reach of rounding runs until nothing moves.
-    let stuck = json!({ "energy": "arap", "gradient_tolerance": 0.0, "energy_tolerance": 0.0, "iterations": 100_000 });
+    let stuck =
+        json!({ "energy": "arap", "gradient_tolerance": 0.0, "energy_tolerance": 0.0, "iteration_limit": 100_000 });
     let stalled = map(twisted_grid(4), stuck, &mut Silent).expect("a map");
     assert_eq!(stalled.stop, "stalled", "{}", stalled.reason);
 }

@@ -249,6 +249,10 @@ fn setting(field: &Field, name: &str) -> Item {
     let mut text = vec![field.doc.to_owned()];
     match &field.kind {
         Kind::Choice(words) => text.extend(words.iter().map(|(word, meaning)| format!("\"{word}\": {meaning}"))),
+        Kind::Named(words) => {
+            let words: Vec<&str> = words().into_iter().map(|(word, _)| word).collect();
+            text.push(format!("One of {}.", words.join(", ")));
+        }
         Kind::Table(_) => {}
         kind => text.push(format!("Expects {}.", expectation(kind))),
     }

@@ -147,25 +147,29 @@ pub fn render(diagnostics: &[Diagnostic], colour: bool) -> String {
             Severity::Warning => Level::WARNING,
             Severity::Notice => Level::NOTE.with_name("notice"),
         };
-        let mut group = match &diagnostic.place {
+        let group = match &diagnostic.place {
             Some(place) => {
                 let mut annotation = AnnotationKind::Primary.span(visible(place));
                 if !diagnostic.label.is_empty() {
                     annotation = annotation.label(diagnostic.label.as_str());
                 }
-                level.primary_title(diagnostic.message.as_str()).element(
-                    Snippet::source(place.source.text.as_str())
-                        .path(place.source.name.as_str())
-                        .annotation(annotation),
-                )
+                let snippet = Snippet::source(place.source.text.as_str())
+                    .path(place.source.name.as_str())
+                    .annotation(annotation);
+                let group = level.primary_title(diagnostic.message.as_str()).element(snippet);
+                match &diagnostic.help {
+                    Some(help) => group.element(Level::HELP.message(help.as_str())),
+                    None => group,
+                }
             }
             None => Group::with_title(level.primary_title(diagnostic.message.as_str())),
         };
-        if let Some(help) = &diagnostic.help {
-            group = group.element(Level::HELP.message(help.as_str()));
-        }
         text.push_str(&renderer.render(&[group]));
-        text.push_str("\n\n");
+        text.push('\n');
+        if let (None, Some(help)) = (&diagnostic.place, &diagnostic.help) {
+            text.push_str(&format!("help: {help}\n"));
+        }
+        text.push('\n');
     }
     text
 }

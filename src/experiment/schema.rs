@@ -3,7 +3,7 @@
 //! Guarantees that every file which the reader takes is valid; the reader finds more, such as names that depend on other
 //! sections. Editors use it for completion and hints.
 
-use super::check::{default, expectation, fields_of};
+use super::check::{default, fields_of};
 use super::column::columns;
 use super::read::axes::paths;
 use super::section::{BOUND, COMPARISON, EXPERIMENT, Holds, Key, PUBLISHED};
@@ -25,6 +25,7 @@ pub fn schema(methods: &[&'static dyn Method]) -> Value {
     let mut cases = Vec::new();
     for method in methods {
         let scope = Scope { method: *method };
+        scope.settings(method.settings(), "", &mut definitions);
         for (name, definition) in scope.definitions() {
             definitions.insert(format!("{}.{name}", method.name()), definition);
         }
@@ -142,10 +143,37 @@ impl Scope {
         json!({ "$ref": self.reference(name) })
     }
 
+    /// A definition for each setting by its dotted path, which axes and conditions refer to.
+    fn settings(&self, fields: &[Field], prefix: &str, definitions: &mut Map<String, Value>) {
+        for field in fields {
+            let path = format!("{prefix}{}", field.name);
+            let schema = match &field.kind {
+                Kind::Table(inner) => described(self.setting_table(inner, &format!("{path}.")), field.doc),
+                _ => self::field(field),
+            };
+            definitions.insert(format!("{}.settings.{path}", self.method.name()), schema);
+            if let Some(inner) = fields_of(&field.kind) {
+                self.settings(inner, &format!("{path}."), definitions);
+            }
+        }
+    }
+
+    fn setting_table(&self, fields: &[Field], prefix: &str) -> Value {
+        let refer = |field: &Field| {
+            (
+                field.name.to_owned(),
+                self.refer(&format!("settings.{prefix}{}", field.name)),
+            )
+        };
+        let properties: Map<String, Value> = fields.iter().map(refer).collect();
+        json!({ "type": "object", "properties": properties, "additionalProperties": false })
+    }
+
     fn definitions(&self) -> Vec<(&'static str, Value)> {
+        let method_settings = self.method.settings();
         vec![
             ("experiment", self.keys(EXPERIMENT, false)),
-            ("settings", table(self.method.settings())),
+            ("settings", self.setting_table(method_settings, "")),
             ("model", self.model()),
             ("axes", self.axes(&values)),
             ("condition", self.axes(&value_or_values)),
@@ -235,7 +263,7 @@ impl Scope {
 
     /// A table by axis name, flat with dotted names or nested. `wrap` makes an entry's schema of a value's.
     fn axes(&self, wrap: &dyn Fn(Value) -> Value) -> Value {
-        let mut properties = fields_as_axes(self.method.settings(), "", wrap);
+        let mut properties = self.fields_as_axes(self.method.settings(), "", "", wrap);
         let text = wrap(json!({ "type": "string" }));
         let mut nested = Map::new();
         for (main, role, parameter, of_each) in parameters(self.method) {
@@ -253,6 +281,37 @@ impl Scope {
             json!({ "anyOf": [text, table], "description": "Names of models." }),
         );
         json!({ "type": "object", "properties": properties, "additionalProperties": false, "minProperties": 1 })
+    }
+
+    /// Each field as an axis, by its dotted path and as a table within a table. `prefix` is the path of these fields,
+    /// `shown` the part of it that is written out here.
+    fn fields_as_axes(
+        &self,
+        fields: &[Field],
+        prefix: &str,
+        shown: &str,
+        wrap: &dyn Fn(Value) -> Value,
+    ) -> Map<String, Value> {
+        let mut properties = Map::new();
+        for field in fields {
+            let path = format!("{prefix}{}", field.name);
+            let name = format!("{shown}{}", field.name);
+            let own = wrap(self.refer(&format!("settings.{path}")));
+            match fields_of(&field.kind) {
+                None => {
+                    properties.insert(name, own);
+                }
+                Some(inner) => {
+                    let path = format!("{path}.");
+                    let dotted = self.fields_as_axes(inner, &path, &format!("{name}."), wrap);
+                    let nested = self.fields_as_axes(inner, &path, "", wrap);
+                    let table = json!({ "type": "object", "properties": nested, "additionalProperties": false });
+                    properties.insert(name, json!({ "anyOf": [own, table] }));
+                    properties.extend(dotted);
+                }
+            }
+        }
+        properties
     }
 
     fn axis(&self) -> Value {
@@ -320,29 +379,4 @@ fn values(value: Value) -> Value {
 /// A value of a condition: one, or any of several.
 fn value_or_values(value: Value) -> Value {
     json!({ "anyOf": [value, { "type": "array", "minItems": 1, "items": value }] })
-}
-
-/// Each field as an axis, by its dotted path and as a table within a table.
-fn fields_as_axes(fields: &[Field], prefix: &str, wrap: &dyn Fn(Value) -> Value) -> Map<String, Value> {
-    let mut properties = Map::new();
-    for field in fields {
-        let path = format!("{prefix}{}", field.name);
-        let own = described(wrap(kind(&field.kind)), field.doc);
-        match fields_of(&field.kind) {
-            None => {
-                properties.insert(path, own);
-            }
-            Some(inner) => {
-                let dotted = fields_as_axes(inner, &format!("{path}."), wrap);
-                let nested = fields_as_axes(inner, "", wrap);
-                let table = json!({ "type": "object", "properties": nested, "additionalProperties": false });
-                properties.insert(
-                    path,
-                    json!({ "anyOf": [own, table], "description": expectation(&field.kind) }),
-                );
-                properties.extend(dotted);
-            }
-        }
-    }
-    properties
 }

@@ -4,6 +4,7 @@
 //! with named values, and mentions everything else in comments with its default.
 
 use super::check::expectation;
+use super::claims::CLAIMS;
 use super::document::quote;
 use super::section::{LIMITS, TIMING};
 use crate::method::Method;
@@ -40,6 +41,13 @@ pub fn template(method: &dyn Method) -> String {
         quote(&question),
         quote(method.name())
     );
+    if let Some(claim) = CLAIMS.iter().find(|claim| claim.method == method.name()) {
+        comment(
+            &mut text,
+            "Claims of the paper that the file reproduces; `vargeo list claims` has them.",
+        );
+        let _ = writeln!(text, "# claims = [{}]\n", quote(claim.id));
+    }
     models(&mut text, method);
     comment(&mut text, "Held for every job. What stands in comments is the default.");
     text.push_str("[settings]\n");
@@ -165,9 +173,8 @@ fn fields(text: &mut String, fields: &[Field], path: &str, varied: Option<&str>)
         } else {
             "# "
         };
-        let _ = writeln!(text, "{mark}{} = {}", field.name, literal(field));
+        let _ = writeln!(text, "{mark}{} = {}\n", field.name, literal(field));
     }
-    text.push('\n');
     for field in fields.iter().filter(is_table) {
         if let Kind::Table(inner) = &field.kind {
             let required = matches!(field.default, Default::Required);

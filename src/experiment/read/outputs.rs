@@ -9,15 +9,15 @@ use crate::experiment::grid;
 use crate::experiment::nearest::suggestion;
 use crate::experiment::section::{PLOT, RATE, TABLE};
 use serde_json::Value;
-use std::collections::BTreeMap;
+use std::collections::BTreeSet;
 use std::ops::Range;
 
 /// Names of files that a report writes by itself.
 const RESERVED: &[&str] = &["index", "jobs", "macros"];
 
-/// Tables, plots and rates; their names are unique.
+/// Tables, plots and rates; the names of each kind are unique.
 pub fn read(checker: &mut Checker, file: &Table, context: &Context<'_>) -> (Vec<file::Table>, Vec<Plot>, Vec<Rate>) {
-    let mut names = BTreeMap::new();
+    let mut names = Names::new();
     let tables = sections(checker, file, "table")
         .iter()
         .filter_map(|node| table(checker, node, context, &mut names))
@@ -77,7 +77,7 @@ fn indistinct(
         .iter()
         .filter(|point| grid::matches(condition, point))
         .collect();
-    let heads: std::collections::BTreeSet<String> = jobs
+    let heads: BTreeSet<String> = jobs
         .iter()
         .map(|point| {
             let head: Vec<_> = point.iter().filter(|(axis, _)| rows.contains(axis)).cloned().collect();
@@ -155,8 +155,8 @@ fn rate(checker: &mut Checker, node: &Node, context: &Context<'_>, names: &mut N
     })
 }
 
-/// Names with what they name.
-type Names = BTreeMap<String, &'static str>;
+/// Names by what they name.
+type Names = BTreeSet<(&'static str, String)>;
 
 fn unique(
     checker: &mut Checker,
@@ -174,9 +174,9 @@ fn unique(
         checker
             .error(span, format!("\"{name}\" is the name of a file that every report has"))
             .help = Some("choose another name".to_owned());
-    } else if let Some(other) = names.insert(name.to_lowercase(), what) {
+    } else if !names.insert((what, name.to_lowercase())) {
         checker
-            .error(span, format!("another {other} has the name \"{name}\""))
+            .error(span, format!("another {what} has the name \"{name}\""))
             .help = Some(format!("give this {what} a name of its own: name = \"...\""));
     }
 }

@@ -54,7 +54,6 @@ pub fn write(experiment: &Experiment, rows: &[Row]) -> Result<Vec<u8>, ReportErr
     head.extend(MEASUREMENTS.iter().map(|measured| unit(measured.name, measured.unit)));
     head.extend(
         [
-            "threads",
             "repetitions",
             "exclusive",
             "timed",
@@ -100,7 +99,6 @@ pub fn write(experiment: &Experiment, rows: &[Row]) -> Result<Vec<u8>, ReportErr
                 .map(|measured| row.measurement(measured.name).map_or_else(String::new, exact)),
         );
         fields.extend([
-            measurement.threads.to_string(),
             measurement.wall_seconds.len().to_string(),
             if measurement.exclusive { "yes" } else { "no" }.into(),
             iso_moment(measurement.started),

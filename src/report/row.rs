@@ -72,6 +72,7 @@ impl Row {
             "peak_memory" => {
                 Some(measurement.peak_memory as f64 / f64::from(1 << 20)).filter(|mebibytes| *mebibytes > 0.0)
             }
+            "threads" => Some(measurement.threads as f64),
             _ => None,
         }
     }

@@ -20,7 +20,8 @@ struct Watch {
 
 impl Observer for Watch {
     fn phase(&mut self, name: &str) {
-        self.phases.push((name.to_string(), Instant::now(), processor_seconds()));
+        self.phases
+            .push((name.to_string(), Instant::now(), processor_seconds()));
     }
 
     fn iterate(&mut self, iterate: &Iterate) {
@@ -39,9 +40,18 @@ impl Observer for Watch {
 
 /// Seconds that all threads of this process have run; 0 where the system does not tell.
 fn processor_seconds() -> f64 {
-    let Ok(stat) = std::fs::read_to_string("/proc/self/stat") else { return 0.0 };
-    let Some((_, after)) = stat.rsplit_once(')') else { return 0.0 };
-    let ticks: f64 = after.split_whitespace().skip(11).take(2).filter_map(|word| word.parse::<f64>().ok()).sum();
+    let Ok(stat) = std::fs::read_to_string("/proc/self/stat") else {
+        return 0.0;
+    };
+    let Some((_, after)) = stat.rsplit_once(')') else {
+        return 0.0;
+    };
+    let ticks: f64 = after
+        .split_whitespace()
+        .skip(11)
+        .take(2)
+        .filter_map(|word| word.parse::<f64>().ok())
+        .sum();
     ticks / 100.0
 }
 
@@ -74,20 +84,30 @@ fn main() {
             eprintln!("{path}: {error}");
             std::process::exit(2);
         });
-        Part::File { name: path.to_string(), bytes, parameters: json!({ "scale": scale }) }
+        Part::File {
+            name: path.to_string(),
+            bytes,
+            parameters: json!({ "scale": scale }),
+        }
     };
     let mut model = LoadedModel::default();
     model.parts.insert(
         "mesh".into(),
         mesh.as_deref().map_or_else(
-            || Part::Generated { generator: "bumpy".into(), parameters: json!({ "tetrahedra": 12_600 }) },
+            || Part::Generated {
+                generator: "bumpy".into(),
+                parameters: json!({ "tetrahedra": 12_600 }),
+            },
             |path| file(path, 1.0),
         ),
     );
     model.parts.insert(
         "target".into(),
         target.as_deref().map_or_else(
-            || Part::Generated { generator: "cube".into(), parameters: json!({}) },
+            || Part::Generated {
+                generator: "cube".into(),
+                parameters: json!({}),
+            },
             |path| file(path, scale),
         ),
     );
@@ -98,9 +118,18 @@ fn main() {
     for energy in &energies {
         settings.insert("energy".into(), json!(energy));
         let settings = Value::Object(settings.clone());
-        let mut watch = Watch { phases: Vec::new(), verbose };
+        let mut watch = Watch {
+            phases: Vec::new(),
+            verbose,
+        };
         let (start, processor) = (Instant::now(), processor_seconds());
-        let outcome = VolumeMap.run(Inputs { settings: &settings, model: model.clone() }, &mut watch);
+        let outcome = VolumeMap.run(
+            Inputs {
+                settings: &settings,
+                model: model.clone(),
+            },
+            &mut watch,
+        );
         let (wall, processor_end) = (start.elapsed().as_secs_f64(), processor_seconds());
         match outcome {
             Ok(outcome) => {
@@ -139,7 +168,12 @@ fn main() {
             }
             Err(failure) => println!("{energy:24} failed ({}): {}", failure.kind, failure.reason),
         }
-        let ends = watch.phases.iter().skip(1).map(|(_, at, cpu)| (*at, *cpu)).chain([(Instant::now(), processor_end)]);
+        let ends = watch
+            .phases
+            .iter()
+            .skip(1)
+            .map(|(_, at, cpu)| (*at, *cpu))
+            .chain([(Instant::now(), processor_end)]);
         let phases: Vec<String> = watch
             .phases
             .iter()
@@ -154,7 +188,9 @@ fn main() {
 
 /// `path.to.key=value` into a table of settings; numbers and booleans are recognised.
 fn set(settings: &mut Map<String, Value>, assignment: &str) {
-    let Some((path, word)) = assignment.split_once('=') else { return };
+    let Some((path, word)) = assignment.split_once('=') else {
+        return;
+    };
     let value = word
         .parse::<i64>()
         .map(Value::from)

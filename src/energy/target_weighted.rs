@@ -39,9 +39,7 @@ fn by_singular_values(kind: Variables, s: [f64; 3], partials: [f64; 3]) -> [f64;
         Variables::Invariants => {
             let a: f64 = s.iter().map(|s| s * s).sum();
             let cof = cofactors(s);
-            std::array::from_fn(|i| {
-                2.0 * s[i] * (partials[0] + partials[1] * (a - s[i] * s[i])) + cof[i] * partials[2]
-            })
+            std::array::from_fn(|i| 2.0 * s[i] * (partials[0] + partials[1] * (a - s[i] * s[i])) + cof[i] * partials[2])
         }
     }
 }
@@ -75,9 +73,19 @@ impl TargetWeighted {
             Variables::SingularValues => s,
         };
         let d = invariants[2];
-        let slopes = self.weigh_slopes(variables, Slopes { value: inner.value, partials: inner.partials });
+        let slopes = self.weigh_slopes(
+            variables,
+            Slopes {
+                value: inner.value,
+                partials: inner.partials,
+            },
+        );
         let (d_i, psi_i) = (cofactors(s), by_singular_values(kind, s, inner.partials));
-        let mut result = Spectrum { value: slopes.value, partials: slopes.partials, ..inner };
+        let mut result = Spectrum {
+            value: slopes.value,
+            partials: slopes.partials,
+            ..inner
+        };
         for k in 0..3 {
             result.flip[k] = d * inner.flip[k] - inner.value * s[k];
             result.twist[k] = d * inner.twist[k] + inner.value * s[k];
@@ -121,7 +129,10 @@ impl Energy for TargetWeighted {
         self.0.slopes_in_lanes(processor, variables, slopes);
         for (variables, slopes) in variables.iter().zip(slopes) {
             for index in 0..WIDTH {
-                let inner = Slopes { value: slopes.value.0[index], partials: lane(&slopes.partials, index) };
+                let inner = Slopes {
+                    value: slopes.value.0[index],
+                    partials: lane(&slopes.partials, index),
+                };
                 let weighed = self.weigh_slopes(lane(variables, index), inner);
                 slopes.value.0[index] = weighed.value;
                 set_lane(&mut slopes.partials, index, weighed.partials);
@@ -161,6 +172,10 @@ impl Energy for TargetWeighted {
     }
 
     fn spectrum(&self, singular_values: [f64; 3], invariants: [f64; 3]) -> Spectrum<f64> {
-        self.weigh_spectrum(singular_values, invariants, self.0.spectrum(singular_values, invariants))
+        self.weigh_spectrum(
+            singular_values,
+            invariants,
+            self.0.spectrum(singular_values, invariants),
+        )
     }
 }

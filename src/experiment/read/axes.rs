@@ -272,8 +272,11 @@ fn check_zip(checker: &mut Checker, zip: &[Named<'_>], group: &[Known]) {
     if let (true, Some(columns)) = (even, columns) {
         let row = |index: usize| columns.iter().map(|values| &values[index]).collect::<Vec<_>>();
         if let Some(copy) = (0..expected).find(|&index| (0..index).any(|earlier| row(earlier) == row(index))) {
-            let words: Vec<String> = row(copy).into_iter().map(quoted).collect();
-            let message = format!("{} stand twice in a zip", words.join(", "));
+            let words = zip
+                .iter()
+                .zip(row(copy))
+                .map(|(axis, value)| format!("{} = {}", axis.name, quoted(value)));
+            let message = format!("{} stands twice in a zip", words.collect::<Vec<_>>().join(", "));
             let span = match &zip[0].node.content {
                 Content::List(items) => items[copy].span.clone(),
                 _ => zip[0].node.span.clone(),

@@ -2,7 +2,11 @@
 
 use nalgebra::{Matrix3, Rotation3, SMatrix, SymmetricEigen, Vector3};
 use serde_json::Value;
+use vargeo::energy::hencky::Hencky;
 use vargeo::energy::lim_barrier::LimBarrier;
+use vargeo::energy::separable::BySingularValues;
+use vargeo::energy::stretch::Stretch;
+use vargeo::energy::target_weighted::TargetWeighted;
 use vargeo::energy::untangling::Untangling;
 use vargeo::energy::{Energy, Matrix9, Variables, energies, find};
 
@@ -15,10 +19,12 @@ static NARROW: Untangling = Untangling {
     lambda: 0.3,
 };
 
-/// The list, and the untangling density with two sets of parameters.
+/// The list, the untangling density with two sets of parameters, and two energies weighted by the image's volume.
 fn all() -> Vec<&'static dyn Energy> {
+    static STRETCH: TargetWeighted = TargetWeighted(&Stretch);
+    static HENCKY: TargetWeighted = TargetWeighted(&BySingularValues(Hencky));
     let mut all = energies().to_vec();
-    all.extend([&WIDE as &dyn Energy, &NARROW]);
+    all.extend([&WIDE as &dyn Energy, &NARROW, &STRETCH, &HENCKY]);
     all
 }
 
@@ -290,6 +296,8 @@ fn barriers_are_infinite_unless_the_determinant_is_positive() {
                 assert!(derivatives.value.is_finite() && derivatives.hessian.iter().all(|entry| entry.is_finite()));
             }
         }
+    }
+    for energy in energies() {
         if energy.is_barrier() {
             let thin = |s: f64| energy.value(&Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, s)));
             assert!(

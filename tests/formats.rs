@@ -809,3 +809,60 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn the_command_converts_shows_and_says_what_is_wrong() {
+    let folder = tempfile::tempdir().expect("a folder for the test");
+    let run = |arguments: &[&str]| {
+        let mut command = assert_cmd::Command::cargo_bin("vargeo").expect("the program is built");
+        let output = command
+            .current_dir(folder.path())
+            .arg("mesh")
+            .args(arguments)
+            .output()
+            .expect("it runs");
+        let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+        (output.status.code(), text(&output.stdout), text(&output.stderr))
+    };
+    // A reversed tetrahedron with a reference, and a section that is left out.
+    let text = "MeshVersionFormatted 2\nDimension 3\nVertices 4\n0 0 0 0\n1 0 0 0\n0 1.5 0 0\n0 0 1 0\nCorners 1\n1\nTetrahedra 1\n1 3 2 4 5\nEnd\n";
+    std::fs::write(folder.path().join("in.mesh"), text).expect("the folder takes files");
+
+    let (code, shown, errors) = run(&["in.mesh"]);
+    assert_eq!((code, errors.as_str()), (Some(0), ""), "{shown}");
+    for words in [
+        "MEDIT",
+        "1 tetrahedra",
+        "reference (1)",
+        "volume",
+        "0.25",
+        "genus 0, closed",
+        "repaired",
+        "Corners",
+    ] {
+        assert!(shown.contains(words), "{words} is not in\n{shown}");
+    }
+    let (code, shown, errors) = run(&["convert", "in.mesh", "out.vtu"]);
+    assert_eq!((code, shown.as_str()), (Some(0), ""), "{errors}");
+    assert!(errors.starts_with("notice: ") && errors.contains("Corners"), "{errors}");
+    let (code, shown, _) = run(&["out.vtu"]);
+    assert!(
+        code == Some(0) && shown.contains("VTU") && shown.contains("reference (1)"),
+        "{shown}"
+    );
+
+    for (arguments, words) in [
+        (&["convert", "in.mesh", "out.stl"][..], "STL cannot hold tetrahedra"),
+        (
+            &["convert", "in.mesh", "out.docx"][..],
+            "the extension tells no mesh format",
+        ),
+        (&["absent.mesh"][..], "cannot be read"),
+        (&[][..], "<FILE>"),
+    ] {
+        let (code, shown, errors) = run(arguments);
+        assert_eq!((code, shown.as_str()), (Some(3), ""), "{errors}");
+        assert!(errors.contains(words), "{errors}");
+    }
+    assert!(!folder.path().join("out.stl").exists());
+}

@@ -2,11 +2,12 @@
 
 use serde_json::{Value, json};
 use vargeo::mesh::connectivity::{boundary, surface_topology};
+use vargeo::mesh::generate::lattice::body_centred;
 use vargeo::mesh::generate::{Generated, generate, generators};
 use vargeo::mesh::quality::{scaled_jacobian, scaled_jacobians};
 use vargeo::mesh::split::{boundary_cells, boundary_chords, boundary_faces};
 use vargeo::mesh::target::{inverted_about, shape, shapes};
-use vargeo::mesh::{TetrahedralMesh, check};
+use vargeo::mesh::{TetrahedralMesh, TriangleMesh, check};
 
 fn make(name: &str, parameters: Value) -> Generated {
     generate(name, &parameters).unwrap_or_else(|error| panic!("{name} {parameters}: {error}"))
@@ -65,6 +66,101 @@ fn every_generator_makes_a_ball_that_maps_onto_cube_and_sphere() {
         }
     }
     assert!(shapes().len() >= 2);
+}
+
+#[test]
+fn polyhedra_are_laid_over_surfaces_without_a_known_map() {
+    for (generator, parameters) in [
+        ("ball", json!({ "tetrahedra": 700 })),
+        ("bar", json!({ "tetrahedra": 3000, "twist": 120, "bend": 200 })),
+        ("bumpy", json!({ "tetrahedra": 3000 })),
+        ("star", json!({ "tetrahedra": 5000, "height": 1.5 })),
+    ] {
+        let mesh = make(generator, parameters).mesh;
+        let surface = boundary(&mesh.cells, mesh.points.len());
+        let place = surface.places();
+        let area = |positions: &[[f64; 3]]| {
+            let cells = surface
+                .triangles
+                .iter()
+                .map(|t| t.map(|vertex| place[vertex as usize]))
+                .collect();
+            TriangleMesh {
+                points: positions.to_vec(),
+                cells,
+            }
+            .area()
+        };
+        // Triangles of positive area whose areas add up to the whole surface cover it once.
+        let cube = shape("cube", &json!({}), &mesh, &surface, None)
+            .expect(generator)
+            .positions;
+        assert!((area(&cube) - 6.0).abs() < 1e-9);
+        let sides = cube.iter().filter(|p| p.iter().any(|&c| c == 0.0 || c == 1.0)).count();
+        assert_eq!(sides, cube.len());
+        let octahedron = shape("octahedron", &json!({}), &mesh, &surface, None)
+            .expect(generator)
+            .positions;
+        assert!((area(&octahedron) - 48f64.sqrt()).abs() < 1e-9);
+        let tetrahedron = shape("tetrahedron", &json!({}), &mesh, &surface, None)
+            .expect(generator)
+            .positions;
+        assert!((area(&tetrahedron) - 64f64.sqrt() / 3f64.sqrt()).abs() < 1e-9);
+        let sphere = shape("sphere", &json!({ "radius": 2 }), &mesh, &surface, None)
+            .expect(generator)
+            .positions;
+        assert!(
+            sphere
+                .iter()
+                .all(|p| (p.iter().map(|c| c * c).sum::<f64>() - 4.0).abs() < 1e-12)
+        );
+        for (positions, centre) in [
+            (cube, [0.5; 3]),
+            (octahedron, [0.0; 3]),
+            (tetrahedron, [0.0; 3]),
+            (sphere, [0.0; 3]),
+        ] {
+            assert_eq!(inverted_about(&surface, &positions, centre), [] as [u32; 0]);
+        }
+    }
+    // A box with a hole through it has no place on a cube; nor has a mesh too coarse for twelve edges.
+    let mut ring = body_centred([6, 6, 3]);
+    let hole = |p: &[f64; 3]| p[..2].iter().all(|c| (0.3..0.7).contains(c));
+    let points = ring.points.clone();
+    ring.cells
+        .retain(|cell| !cell.iter().any(|&vertex| hole(&points[vertex as usize])));
+    let refused = |mesh: &TetrahedralMesh| {
+        let surface = boundary(&mesh.cells, mesh.points.len());
+        shape("cube", &json!({}), mesh, &surface, None).expect_err("should be refused")
+    };
+    assert!(refused(&ring).contains("genus 1"));
+    let single = TetrahedralMesh {
+        points: vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+        cells: vec![[0, 1, 2, 3]],
+    };
+    assert!(refused(&single).contains("no room"));
+}
+
+#[test]
+fn a_strong_swirl_is_unfolded_or_refused() {
+    let Generated { mesh, natural } = make("bumpy", json!({}));
+    let surface = boundary(&mesh.cells, mesh.points.len());
+    let swirled = |swirl: f64| {
+        shape(
+            "cube",
+            &json!({ "swirl": swirl, "warp": 0.12 }),
+            &mesh,
+            &surface,
+            natural.as_deref(),
+        )
+        .map(|t| t.positions)
+    };
+    // One by one the displaced points would turn some triangles over.
+    for swirl in [1.0, 2.0] {
+        let positions = swirled(swirl).expect("can be unfolded");
+        assert_eq!(inverted_about(&surface, &positions, [0.5; 3]), [] as [u32; 0]);
+    }
+    assert!(swirled(15.0).expect_err("too strong").contains("lower `swirl`"));
 }
 
 #[test]

@@ -1,7 +1,9 @@
 //! One test binary; a file a property.
 
+mod commands;
 mod connectivity;
 mod damaged_files;
+mod distortion;
 mod energies;
 mod experiment_files;
 mod floors;
@@ -12,6 +14,7 @@ mod kernels;
 mod keys;
 mod mapping;
 mod mesh_checks;
+mod optimizers;
 mod page;
 mod plan;
 mod rates;

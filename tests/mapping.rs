@@ -4,6 +4,7 @@ use crate::energies::Random;
 use nalgebra::{Matrix3, SMatrix, SymmetricEigen, Vector3};
 use vargeo::energy::lim_barrier::LimBarrier;
 use vargeo::energy::mapping::{BLOCK_NUMBERS, BLOCK_PAIRS, Density, InvalidRest, MappingEnergy};
+use vargeo::energy::target_weighted::TargetWeighted;
 use vargeo::energy::untangling::Untangling;
 use vargeo::energy::{energies, find};
 use vargeo::linalg::processor::Processor;
@@ -128,6 +129,7 @@ fn densities() -> Vec<Density> {
         epsilon: 0.2,
         lambda: 1.0,
     }));
+    all.extend(energies().iter().map(|&energy| Density::of(TargetWeighted(energy))));
     all
 }
 

@@ -140,6 +140,19 @@ fn series_are_told_apart_without_colour() {
 }
 
 #[test]
+fn an_axis_comes_before_a_figure_or_trace_of_its_name() {
+    let mut rows = sample::rows();
+    for row in &mut rows {
+        row.record.result.metrics.insert("energy".into(), 4.5);
+    }
+    let chart = plot::chart(&sample::experiment(), &sample::experiment().plots[1], &rows);
+    let names = ["dirichlet", "stretch", "lscm"].map(String::from).to_vec();
+    assert_eq!(chart.x.kind, plot::axis::Kind::Category(names));
+    let sheet = compare::Sheet::read(&jobs::write(&sample::experiment(), &rows).unwrap()).unwrap();
+    assert!(compare::compare(&sheet, &sheet).same());
+}
+
+#[test]
 fn what_cannot_be_shown_on_a_plot_is_told() {
     let (mut rows, _) = sample::study();
     rows[3].record.result.metrics.insert("error".into(), -1.0);

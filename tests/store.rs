@@ -171,7 +171,7 @@ fn every_kind_of_damage_is_a_miss_and_goes_to_quarantine() {
     let template = sound.entry(&stored.key);
     let names = ["manifest.json", "record.json", MESH];
 
-    let damages: Vec<(String, Box<dyn Fn(&Path)>)> = damages(&template, &names);
+    let damages: Vec<Damage> = damages(&template, &names);
     assert!(damages.len() > 1000, "only {} kinds of damage", damages.len());
     let store = Store::new(folder.path().join("store"));
     let entry = store.entry(&stored.key);
@@ -198,9 +198,12 @@ fn every_kind_of_damage_is_a_miss_and_goes_to_quarantine() {
     assert_eq!(text(&hit(&store, &stored.key)), text(&stored));
 }
 
+/// Its name, and how it is inflicted on an entry's folder.
+type Damage = (String, Box<dyn Fn(&Path)>);
+
 /// What can befall an entry: every bit position of every byte is flipped in turn, and files are cut, grown and swapped.
-fn damages(template: &Path, names: &[&str]) -> Vec<(String, Box<dyn Fn(&Path)>)> {
-    let mut damages: Vec<(String, Box<dyn Fn(&Path)>)> = Vec::new();
+fn damages(template: &Path, names: &[&str]) -> Vec<Damage> {
+    let mut damages: Vec<Damage> = Vec::new();
     for &name in names {
         let bytes = std::fs::read(template.join(name)).unwrap();
         let mut add = |what: String, content: Vec<u8>| {
@@ -420,6 +423,7 @@ fn killed_at_random_instants_the_store_stays_sound() {
     let folder = folder();
     let store = Store::new(folder.path());
     let orders = format!("{}|forever", folder.path().display());
+    let mut before = 0;
     for round in 0..12_u64 {
         let mut publishers: Vec<_> = (0..2)
             .map(|_| this_test("store::publisher", PUBLISHER, &orders).spawn().unwrap())
@@ -430,10 +434,12 @@ fn killed_at_random_instants_the_store_stays_sound() {
             publisher.kill().unwrap();
             publisher.wait().unwrap();
         }
-        let (_, damaged) = store.verify().unwrap();
+        let (sound, damaged) = store.verify().unwrap();
         assert!(damaged.is_empty(), "round {round}: {damaged:?}");
+        assert!(sound >= before, "round {round}: an entry that was there is lost");
+        before = sound;
     }
-    assert_eq!(store.verify().unwrap().0, 7);
+    assert_eq!(before, 7);
 }
 
 #[test]

@@ -5,10 +5,10 @@ use vargeo::mesh::TetrahedralMesh;
 use vargeo::mesh::connectivity::{self, NONE};
 use vargeo::mesh::generate;
 use vargeo::mesh::target::{self, Target};
+use vargeo::method::volume_map;
 use vargeo::method::volume_map::feasibility::{self, planar_faces};
 use vargeo::method::volume_map::problem::Problem;
 use vargeo::method::volume_map::settings::Settings;
-use vargeo::method::volume_map;
 use vargeo::optimize::Silent;
 
 fn settings(value: serde_json::Value) -> Settings {
@@ -19,7 +19,14 @@ fn settings(value: serde_json::Value) -> Settings {
 fn on_shape(generator: &str, parameters: serde_json::Value, shape: &str) -> (TetrahedralMesh, Vec<[f64; 3]>) {
     let generated = generate::generate(generator, &parameters).expect("a mesh");
     let boundary = connectivity::boundary(&generated.mesh.cells, generated.mesh.points.len());
-    let target = target::shape(shape, &json!({}), &generated.mesh, &boundary, generated.natural.as_deref()).expect("a target");
+    let target = target::shape(
+        shape,
+        &json!({}),
+        &generated.mesh,
+        &boundary,
+        generated.natural.as_deref(),
+    )
+    .expect("a target");
     let mut positions = vec![[0.0; 3]; generated.mesh.points.len()];
     for (&vertex, &position) in boundary.vertices.iter().zip(&target.positions) {
         positions[vertex as usize] = position;
@@ -29,7 +36,10 @@ fn on_shape(generator: &str, parameters: serde_json::Value, shape: &str) -> (Tet
 
 fn target_of(mesh: &TetrahedralMesh, positions: &[[f64; 3]]) -> Target {
     let boundary = connectivity::boundary(&mesh.cells, mesh.points.len());
-    Target { positions: boundary.vertices.iter().map(|&v| positions[v as usize]).collect(), interior: None }
+    Target {
+        positions: boundary.vertices.iter().map(|&v| positions[v as usize]).collect(),
+        interior: None,
+    }
 }
 
 #[test]
@@ -57,7 +67,7 @@ fn planar_faces_of_a_cube_are_six_and_a_sphere_has_none_that_matter() {
 
 #[test]
 fn a_triangle_turned_over_is_named_and_bounds_the_inversions() {
-    let (mesh, mut positions) = on_shape("cube", json!({ "tetrahedra": 3000 }), "cube");
+    let (mesh, mut positions) = on_shape("cube", json!({ "tetrahedra": 1200 }), "cube");
     let boundary = connectivity::boundary(&mesh.cells, mesh.points.len());
     assert!(!feasibility::check(&mesh, &boundary, &positions).forbid());
     // A vertex in the middle of the top moves across one of its triangles, past the opposite edge.
@@ -68,15 +78,14 @@ fn a_triangle_turned_over_is_named_and_bounds_the_inversions() {
         .find(|(_, triangle)| {
             triangle.iter().all(|&v| {
                 let [x, y, z] = positions[v as usize];
-                z == 1.0 && x > 0.2 && x < 0.8 && y > 0.2 && y < 0.8
+                z == 1.0 && x > 0.1 && x < 0.9 && y > 0.1 && y < 0.9
             })
         })
         .map(|(index, triangle)| (index, *triangle))
         .expect("a triangle inside the top");
     let [a, b, c] = triangle.map(|v| positions[v as usize]);
     let middle = [(b[0] + c[0]) / 2.0, (b[1] + c[1]) / 2.0];
-    positions[triangle[0] as usize] =
-        [a[0] + 1.2 * (middle[0] - a[0]), a[1] + 1.2 * (middle[1] - a[1]), 1.0];
+    positions[triangle[0] as usize] = [a[0] + 1.2 * (middle[0] - a[0]), a[1] + 1.2 * (middle[1] - a[1]), 1.0];
     let obstacles = feasibility::check(&mesh, &boundary, &positions);
     assert!(obstacles.inverted_triangles.contains(&triangle), "{obstacles:?}");
     assert!(obstacles.lower_bound >= 1 && obstacles.lower_bound <= obstacles.inverted_triangles.len());
@@ -86,10 +95,14 @@ fn a_triangle_turned_over_is_named_and_bounds_the_inversions() {
     let failure = volume_map::run(&problem, &chosen, &mut Silent).expect_err("refused");
     assert_eq!(failure.kind, "infeasible");
     let name = format!("{triangle:?}");
-    assert!(failure.reason.contains(&name) && failure.reason.contains("at least"), "{}", failure.reason);
+    assert!(
+        failure.reason.contains(&name) && failure.reason.contains("at least"),
+        "{}",
+        failure.reason
+    );
 
     // Told to go on, exactly the forced ones stay inverted, and the outcome says so.
-    let chosen = settings(json!({ "energy": "stretch", "on_infeasible": "continue", "untangling": { "steps": 40 } }));
+    let chosen = settings(json!({ "energy": "stretch", "on_infeasible": "continue", "untangling": { "steps": 20 } }));
     let outcome = volume_map::run(&problem, &chosen, &mut Silent).expect("a map");
     assert_eq!(outcome.stop, "stalled", "{}", outcome.reason);
     assert_eq!(outcome.metrics["inverted"], problem.obstacles.lower_bound as f64);
@@ -102,15 +115,21 @@ fn a_triangle_turned_over_is_named_and_bounds_the_inversions() {
     assert!(flat.flat_triangles.contains(&triangle) || flat.inverted_triangles.contains(&triangle));
 }
 
-/// Two tetrahedra glued to the sides of an edge, and a third pair below, so that one interior edge joins two vertices of
-/// the top of a prism-like solid.
 #[test]
-fn edges_and_tetrahedra_that_leave_no_room_are_split() {
-    // A Kuhn cube: all eight vertices on the boundary, its diagonal inside, every tetrahedron with four boundary vertices.
+fn tetrahedra_that_the_boundary_inverts_are_split() {
+    // A Kuhn cube: all eight vertices on the boundary, its diagonal 0-7 inside, no tetrahedron with a free vertex.
     let corner = |i: u32| [f64::from(i & 1), f64::from(i >> 1 & 1), f64::from(i >> 2 & 1)];
+    let kuhn = [
+        [0, 1, 3, 7],
+        [0, 1, 7, 5],
+        [0, 5, 7, 4],
+        [0, 3, 2, 7],
+        [0, 2, 6, 7],
+        [0, 6, 4, 7],
+    ];
     let mesh = TetrahedralMesh {
         points: (0..8).map(corner).collect(),
-        cells: vec![[0, 1, 3, 7], [0, 1, 7, 5], [0, 5, 7, 4], [0, 3, 2, 7], [0, 2, 6, 7], [0, 6, 4, 7]]
+        cells: kuhn
             .into_iter()
             .map(|[a, b, c, d]: [u32; 4]| {
                 let positive = vargeo::mesh::determinant([a, b, c, d].map(corner)) > 0.0;
@@ -119,22 +138,29 @@ fn edges_and_tetrahedra_that_leave_no_room_are_split() {
             .collect(),
     };
     let boundary = connectivity::boundary(&mesh.cells, 8);
-    assert!(!feasibility::check(&mesh, &boundary, &mesh.points).forbid(), "the identity needs no split");
-    // Corner 7 goes to the plane of the bottom, outside the square: the diagonal 0-7 lies in the bottom's plane.
+    assert!(
+        !feasibility::check(&mesh, &boundary, &mesh.points).forbid(),
+        "the identity needs no split"
+    );
+    // Corner 1 is pressed in, past the diagonal: the tetrahedra behind it turn inside out, on no planar face.
     let mut positions = mesh.points.clone();
-    for vertex in 4..8usize {
-        positions[vertex][2] = 1.0;
-    }
-    positions[7] = [0.4, 0.4, 1.0];
+    positions[1] = [0.3, 0.55, 0.45];
+    let turned: Vec<u32> = (0..6)
+        .filter(|&cell| vargeo::mesh::determinant(mesh.cells[cell as usize].map(|v| positions[v as usize])) <= 0.0)
+        .collect();
+    assert!(!turned.is_empty());
     let obstacles = feasibility::check(&mesh, &boundary, &positions);
-    assert!(!obstacles.tetrahedra.is_empty() || !obstacles.inverted_triangles.is_empty(), "{obstacles:?}");
-    let before = obstacles.tetrahedra.len();
-    let mut moved = positions.clone();
-    let (refined, splits) = feasibility::split_needed(&mesh, &mut moved, |_| {});
-    assert!(splits.edges + splits.tetrahedra > 0 || before == 0, "{splits:?}");
-    assert_eq!(moved.len(), refined.points.len());
+    assert_eq!(obstacles.tetrahedra, turned);
+    assert!(obstacles.lower_bound >= turned.len());
+    let (refined, splits) = feasibility::split_needed(&mesh, &mut positions, |_| {});
+    assert_eq!(splits.edges, 1, "the diagonal");
+    assert_eq!(positions.len(), refined.points.len());
     let boundary = connectivity::boundary(&refined.cells, refined.points.len());
-    assert!(feasibility::check(&refined, &boundary, &moved).tetrahedra.is_empty());
+    assert!(
+        feasibility::check(&refined, &boundary, &positions)
+            .tetrahedra
+            .is_empty()
+    );
     assert!((refined.volume() - 1.0).abs() < 1e-14);
 }
 
@@ -151,7 +177,10 @@ fn an_interior_edge_within_a_planar_face_is_found_and_split() {
         [0.0, 0.0, -1.0],
     ];
     let around = [[0u32, 1, 2, 4], [0, 2, 3, 4], [0, 2, 1, 5], [0, 3, 2, 5]];
-    let mesh = TetrahedralMesh { points: points.clone(), cells: around.to_vec() };
+    let mesh = TetrahedralMesh {
+        points: points.clone(),
+        cells: around.to_vec(),
+    };
     assert!(mesh.volumes().iter().all(|&volume| volume > 0.0));
     let mut positions = points;
     positions[4] = [0.2, 0.1, 0.0];
@@ -162,12 +191,26 @@ fn an_interior_edge_within_a_planar_face_is_found_and_split() {
     let chosen = settings(json!({ "energy": "stretch", "split": "none" }));
     let problem = Problem::from_parts(mesh.clone(), target_of(&mesh, &positions), &chosen, Vec::new()).unwrap();
     let failure = volume_map::run(&problem, &chosen, &mut Silent).expect_err("refused");
-    assert!(failure.kind == "infeasible" && failure.reason.contains("split = \"needed\""), "{}", failure.reason);
+    assert!(
+        failure.kind == "infeasible" && failure.reason.contains("split = \"needed\""),
+        "{}",
+        failure.reason
+    );
 
     let chosen = settings(json!({ "energy": "stretch" }));
     let problem = Problem::from_parts(mesh.clone(), target_of(&mesh, &positions), &chosen, Vec::new()).unwrap();
     assert_eq!(problem.splits.edges, 1);
     let outcome = volume_map::run(&problem, &chosen, &mut Silent).expect("a map");
-    assert_eq!((outcome.stop.as_str(), outcome.metrics["inverted"]), ("converged", 0.0), "{}", outcome.reason);
-    assert!(outcome.notices.iter().any(|notice| notice.contains("split 1 interior edges")));
+    assert_eq!(
+        (outcome.stop.as_str(), outcome.metrics["inverted"]),
+        ("converged", 0.0),
+        "{}",
+        outcome.reason
+    );
+    assert!(
+        outcome
+            .notices
+            .iter()
+            .any(|notice| notice.contains("split 1 interior edges"))
+    );
 }

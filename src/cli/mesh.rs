@@ -1,8 +1,9 @@
 //! `vargeo mesh`: what a mesh file holds, and conversion between formats.
 
 use super::Exit;
-use crate::mesh::check::{self, Problem, Severity, Summary};
+use crate::mesh::check::{self, Problem, Severity};
 use crate::mesh::format::{self, CellKind, Content, Format};
+use crate::mesh::summary::{self, Summary};
 use crate::mesh::{TetrahedralMesh, TriangleMesh, bounding_box};
 use std::path::{Path, PathBuf};
 
@@ -151,7 +152,7 @@ fn summarize(content: &Content, notices: &mut Vec<String>) -> (Option<Summary>, 
             cells: content.tetrahedra.clone(),
         };
         let problems = check::tetrahedra(&mut mesh);
-        return (check::summarize_tetrahedra(&mesh), problems);
+        return (summary::summarize_tetrahedra(&mesh), problems);
     }
     if content.triangles.is_empty() && content.quads.is_empty() {
         return (None, Vec::new());
@@ -166,5 +167,5 @@ fn summarize(content: &Content, notices: &mut Vec<String>) -> (Option<Summary>, 
             .extend(content.quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]));
     }
     let problems = check::triangles(&mesh);
-    (check::summarize_triangles(&mesh), problems)
+    (summary::summarize_triangles(&mesh), problems)
 }

@@ -7,6 +7,7 @@ use crate::experiment::grid;
 use crate::experiment::nearest::suggestion;
 use crate::experiment::plan::Plan;
 use crate::experiment::record::{Record, Status};
+use crate::report::gate::Outcome;
 use crate::report::{self, Row};
 use crate::run::interrupt::Interrupt;
 use crate::run::store::{MESH, Store};
@@ -247,6 +248,17 @@ pub(super) fn write_report(
     let written = report::write(experiment, rows, &folder).map_err(|error| wrong(&error.to_string()))?;
     if !quiet {
         say(&report::terminal(experiment, rows, None));
+        let unmet = written
+            .verdicts
+            .iter()
+            .filter(|verdict| verdict.outcome == Outcome::Failed)
+            .count();
+        if unmet > 0 {
+            say(&format!(
+                "{unmet} of {} expectations are not met; `vargeo check` says which",
+                written.verdicts.len()
+            ));
+        }
         say(&format!("page: {}", written.page.display()));
     }
     Ok(written)

@@ -1,6 +1,7 @@
 //! `vargeo store`: verify it, count it, tidy it.
 
 use super::Exit;
+use super::input::Input;
 use crate::experiment::job::Key;
 use crate::run::store::{Garbage, GarbageKind, Store};
 use indicatif::HumanBytes;
@@ -42,6 +43,12 @@ struct Tidy {
     /// Hours for which unfinished writes are left alone, since another process may be at work on them.
     #[arg(long, value_name = "HOURS", default_value_t = 24)]
     older: u64,
+    /// Remove the results of all experiments but these as well; may be given several times.
+    #[arg(long, value_name = "FILE")]
+    keep: Vec<PathBuf>,
+    /// A folder where their model files are looked for too.
+    #[arg(long, value_name = "DIR", requires = "keep")]
+    models: Vec<PathBuf>,
 }
 
 /// Does what is asked.
@@ -110,7 +117,13 @@ fn statistics(place: &Place) -> Done {
 
 fn collect(tidy: &Tidy) -> Done {
     let store = open(&tidy.place)?;
-    let keep: Option<BTreeSet<Key>> = None;
+    let keep = match tidy.keep.is_empty() {
+        true => None,
+        false => match keys(tidy) {
+            Ok(keys) => Some(keys),
+            Err(exit) => return Ok(exit),
+        },
+    };
     let age = Duration::from_secs(tidy.older.saturating_mul(3600));
     let garbage = store.garbage(age, keep.as_ref())?;
     let mut sums: BTreeMap<GarbageKind, (usize, u64)> = BTreeMap::new();
@@ -138,4 +151,30 @@ fn collect(tidy: &Tidy) -> Done {
         (false, false) => println!("nothing was removed; --delete does it"),
     }
     Ok(Exit::Well)
+}
+
+/// The keys of every job of the experiments to keep. All their models must be there, for a job without them has no key.
+fn keys(tidy: &Tidy) -> Result<BTreeSet<Key>, Exit> {
+    let mut keys = BTreeSet::new();
+    for file in &tidy.keep {
+        let input = Input {
+            file: file.clone(),
+            models: tidy.models.clone(),
+        };
+        for job in input.plan()?.jobs {
+            match (job.resolved, job.missing) {
+                (Some((key, _)), _) => keys.extend([key]),
+                (None, missing) => {
+                    let reason = missing.unwrap_or_default();
+                    eprintln!(
+                        "error: {}: which results to keep is not known ({reason})",
+                        file.display()
+                    );
+                    eprintln!("help: name the folder of its models with --models");
+                    return Err(Exit::FileWrong);
+                }
+            }
+        }
+    }
+    Ok(keys)
 }

@@ -33,7 +33,7 @@ pub mod mapping;
 use crate::linalg::lanes::Lanes;
 use crate::linalg::processor::Processor;
 use crate::linalg::svd3::{SignedSvd, signed_svd};
-use crate::linalg::vector3::{Columns, cofactor, dot};
+use crate::linalg::vector3::{Columns, cofactor, dot, inner};
 use nalgebra::{Matrix3, SMatrix};
 use spectrum::{Slopes, Spectrum, stress_by_invariants, stress_by_singular_values};
 
@@ -199,8 +199,7 @@ fn with_sign_of<R: crate::linalg::scalar::Real>(smallest: R, determinant: R) -> 
 #[inline(always)]
 pub fn invariants<S: crate::linalg::scalar::Scalar>(jacobian: &Columns<S>) -> [S; 3] {
     let cof = cofactor(jacobian);
-    let square = |m: &Columns<S>| dot(m[0], m[0]) + dot(m[1], m[1]) + dot(m[2], m[2]);
-    [square(jacobian), square(&cof), dot(jacobian[0], cof[0])]
+    [inner(jacobian, jacobian), inner(&cof, &cof), dot(jacobian[0], cof[0])]
 }
 
 /// The columns of a matrix.

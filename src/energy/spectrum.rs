@@ -145,6 +145,14 @@ impl<R: Real> Spectrum<R> {
 
 impl<V: Vector> Slopes<V> {
     #[inline(always)]
+    pub fn load(lanes: &Slopes<Lanes>) -> Slopes<V> {
+        Slopes {
+            value: V::load(&lanes.value),
+            partials: load(&lanes.partials),
+        }
+    }
+
+    #[inline(always)]
     pub fn store(self, out: &mut Slopes<Lanes>) {
         self.value.store(&mut out.value);
         store(self.partials, &mut out.partials);

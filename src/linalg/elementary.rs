@@ -5,8 +5,8 @@
 
 use super::scalar::Real;
 
-const LN2_HIGH: f64 = 6.931_471_803_691_238_164_90e-1;
-const LN2_LOW: f64 = 1.908_214_929_270_587_700_02e-10;
+const LN2_HIGH: f64 = 6.931_471_803_691_238e-1;
+const LN2_LOW: f64 = 1.908_214_929_270_587_7e-10;
 
 /// `1 + z/3 + z^2/5 + ...`, that is `atanh(f)/f` at `z = f^2`, to rounding for `z <= 0.0295`.
 #[inline(always)]

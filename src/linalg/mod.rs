@@ -7,6 +7,10 @@ pub mod scalar;
 pub mod elementary;
 pub mod jet;
 pub mod lanes;
+#[cfg(target_arch = "x86_64")]
+mod avx2;
+#[cfg(target_arch = "x86_64")]
+mod avx512;
 pub mod processor;
 pub mod vector3;
 pub mod svd3;

@@ -55,3 +55,9 @@ pub fn apply_transposed<S: Scalar>(matrix: &Columns<S>, x: Vector3<S>) -> Vector
 pub fn cofactor<S: Scalar>(m: &Columns<S>) -> Columns<S> {
     [cross(m[1], m[2]), cross(m[2], m[0]), cross(m[0], m[1])]
 }
+
+/// `sum_ij a_ij b_ij`.
+#[inline(always)]
+pub fn inner<S: Scalar>(a: &Columns<S>, b: &Columns<S>) -> S {
+    dot(a[0], b[0]) + dot(a[1], b[1]) + dot(a[2], b[2])
+}

@@ -284,15 +284,13 @@ pub fn components<const N: usize>(cells: &[[u32; N]], vertices: usize) -> Compon
         count: 0,
         of_vertex: vec![NONE; vertices],
     };
-    for vertex in 0..vertices {
-        if used[vertex] {
-            let root = sets.root(vertex as u32) as usize;
-            if root == vertex {
-                found.of_vertex[vertex] = found.count as u32;
-                found.count += 1;
-            } else {
-                found.of_vertex[vertex] = found.of_vertex[root];
-            }
+    for vertex in (0..vertices).filter(|&vertex| used[vertex]) {
+        let root = sets.root(vertex as u32) as usize;
+        if root == vertex {
+            found.of_vertex[vertex] = found.count as u32;
+            found.count += 1;
+        } else {
+            found.of_vertex[vertex] = found.of_vertex[root];
         }
     }
     found
@@ -309,11 +307,9 @@ pub fn pinched_vertices<const N: usize>(cells: &[[u32; N]], vertices: usize, fac
                 continue;
             }
             let other = &cells[neighbour as usize];
-            for (corner, vertex) in cell.iter().enumerate() {
-                if corner != local {
-                    if let Some(place) = other.iter().position(|v| v == vertex) {
-                        corners.join((index * N + corner) as u32, neighbour * N as u32 + place as u32);
-                    }
+            for (corner, vertex) in cell.iter().enumerate().filter(|&(corner, _)| corner != local) {
+                if let Some(place) = other.iter().position(|v| v == vertex) {
+                    corners.join((index * N + corner) as u32, neighbour * N as u32 + place as u32);
                 }
             }
         }
@@ -420,9 +416,9 @@ pub fn surface_topology(triangles: &[[u32; 3]], vertices: usize) -> SurfaceTopol
         }
     }
     found.boundary_vertices = on_rim.iter().filter(|&&on| on).count();
-    for vertex in 0..vertices {
+    for (vertex, &part) in parts.of_vertex.iter().enumerate() {
         if on_rim[vertex] && rims.root(vertex as u32) as usize == vertex {
-            found.components[parts.of_vertex[vertex] as usize].loops += 1;
+            found.components[part as usize].loops += 1;
         }
     }
     for (part, &spoiled) in found.components.iter_mut().zip(&spoiled) {

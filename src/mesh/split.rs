@@ -52,6 +52,14 @@ impl Refinement {
 /// A tetrahedron with several of them is split by one after the other in the given order, so that neighbours agree on
 /// their common face. Repeated simplices count once; those that the mesh does not have are passed over.
 pub fn split<const K: usize>(mesh: &TetrahedralMesh, simplices: &[[u32; K]]) -> Refinement {
+    if simplices.is_empty() {
+        let origin = (0..mesh.cells.len() as u32).collect();
+        return Refinement {
+            mesh: mesh.clone(),
+            parents: Vec::new(),
+            origin,
+        };
+    }
     // Sorted keys, each with the rank of its first appearance.
     let mut keys: Vec<([u32; K], u32)> = simplices
         .iter()

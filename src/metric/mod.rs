@@ -1,5 +1,8 @@
 //! What is measured of a result: each metric has a name, a unit, a floor, a better direction and a definition.
 
+pub mod distortion;
+pub mod scaled_jacobian;
+
 /// Which way a metric improves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Better {
@@ -23,4 +26,12 @@ pub struct Metric {
     pub better: Better,
     /// One or two sentences with the formula and its source.
     pub definition: &'static str,
+}
+
+/// Every family of metrics of this floor; methods name those that they report and add their own.
+pub fn families() -> [(&'static str, &'static [Metric]); 2] {
+    [
+        ("distortion", distortion::METRICS),
+        ("scaled-jacobian", scaled_jacobian::METRICS),
+    ]
 }

@@ -38,8 +38,6 @@ impl Newton {
         let mut value = f64::NAN;
         let mut gradient_norm = f64::NAN;
         let mut step = 0.0;
-        // The energy before the last accepted step.
-        let mut before: Option<f64> = None;
         let (stop, reason) = loop {
             counters.evaluations += 1;
             let model = objective.newton_direction(&x, &mut gradient, &mut direction);
@@ -68,9 +66,6 @@ impl Newton {
                 step,
             });
             if let Some(reason) = self.stopping.gradient(gradient_norm) {
-                break (StopReason::Converged, reason);
-            }
-            if let Some(reason) = before.and_then(|before| self.stopping.change(before, value)) {
                 break (StopReason::Converged, reason);
             }
             let slope = dot(&gradient, &direction);
@@ -102,10 +97,23 @@ impl Newton {
                 .search(objective, start, &mut point, &mut spare, &mut counters.evaluations)
             {
                 Some(accepted) => {
-                    before = Some(value);
+                    let change = self.stopping.change(value, accepted.value);
                     std::mem::swap(&mut x, &mut point);
                     step = accepted.length;
                     counters.iterations += 1;
+                    if let Some(reason) = change {
+                        // The gradient completes the report; a Hessian and its factorization would be for nothing.
+                        counters.evaluations += 1;
+                        value = objective.gradient(&x, &mut gradient);
+                        gradient_norm = norm(&gradient);
+                        observer.iterate(&Iterate {
+                            iteration: counters.iterations,
+                            energy: value,
+                            gradient_norm,
+                            step,
+                        });
+                        break (StopReason::Converged, reason);
+                    }
                 }
                 None => {
                     break (

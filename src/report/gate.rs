@@ -199,10 +199,7 @@ pub fn holds(bound: &Bound, value: f64) -> bool {
 
 /// A bound in words.
 pub fn describe(bound: &Bound) -> String {
-    let plain = |value: f64| {
-        let wide = value != 0.0 && !(1e-4..1e9).contains(&value.abs());
-        if wide { format!("{value:e}") } else { format!("{value}") }
-    };
+    let plain = number::written;
     let mut parts = Vec::new();
     if let Some(min) = bound.min {
         parts.push(format!("at least {}", plain(min)));
@@ -212,7 +209,11 @@ pub fn describe(bound: &Bound) -> String {
     }
     if let Some(equals) = bound.equals {
         parts.push(match bound.tolerance {
-            Some(tolerance) => format!("{} within {} %", plain(equals), plain(100.0 * tolerance)),
+            Some(tolerance) => format!(
+                "{} within {} %",
+                plain(equals),
+                number::round(100.0 * tolerance, 3).plain()
+            ),
             None => format!("exactly {}", plain(equals)),
         });
     }

@@ -37,7 +37,17 @@ pub fn write(experiment: &Experiment, rows: &[Row]) -> Result<Vec<u8>, ReportErr
         }
     };
     let mut head: Vec<String> = vec!["job".into()];
-    head.extend(axes.iter().map(|axis| axis.to_string()));
+    // An axis may be named like a figure, such as `energy`: no two columns share a name.
+    let is_figure = |axis: &str| {
+        declared.iter().any(|metric| metric.name == axis) || others.contains(axis) || counters.contains(axis)
+    };
+    head.extend(axes.iter().map(|axis| {
+        if is_figure(axis) {
+            format!("{axis} (axis)")
+        } else {
+            axis.to_string()
+        }
+    }));
     head.extend(["status", "stop", "reason"].map(String::from));
     head.extend(declared.iter().map(|metric| unit(metric.name, metric.unit)));
     head.extend(others.iter().chain(&counters).map(|name| name.to_string()));

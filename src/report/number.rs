@@ -75,6 +75,15 @@ impl Rounded {
     }
 }
 
+/// All digits of a number that a person wrote, as short as they can be: `0.05`, `1e8`.
+pub fn written(value: f64) -> String {
+    if value != 0.0 && !(1e-4..1e6).contains(&value.abs()) {
+        format!("{value:e}")
+    } else {
+        format!("{value}")
+    }
+}
+
 /// An exponent in raised digits.
 pub fn superscript(exponent: i32) -> String {
     exponent

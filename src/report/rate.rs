@@ -93,7 +93,7 @@ fn fit_series(rate: &Rate, rows: &[Row]) -> Vec<Fit> {
         };
         let (_, points, left_out) = &mut series[index];
         let usable = |value: Option<f64>| value.filter(|value| value.is_finite() && *value > 0.0);
-        match (usable(row.figure(&rate.x)), usable(row.figure(&rate.y))) {
+        match (usable(row.coordinate(&rate.x)), usable(row.figure(&rate.y))) {
             (Some(x), Some(y)) => {
                 if rate.window.is_none_or(|[low, high]| (low..=high).contains(&x)) {
                     let seed = |axis: &str| axis.rsplit('.').next() == Some("seed");

@@ -54,13 +54,24 @@ impl Row {
         }
     }
 
+    /// The place on a plot's or rate's x: a varied axis comes before a figure of its name, such as `energy`.
+    pub fn coordinate(&self, name: &str) -> Option<f64> {
+        match self.axes.iter().find(|(axis, _)| axis == name) {
+            Some((_, value)) => value.as_f64(),
+            None => self.figure(name),
+        }
+    }
+
     /// A measurement in its own unit; absent where nothing was measured.
     pub fn measurement(&self, name: &str) -> Option<f64> {
         let measurement = &self.record.measurement;
         match name {
             "seconds" => median(&measurement.wall_seconds),
             "cpu_seconds" => median(&measurement.cpu_seconds),
-            "peak_memory" => Some(measurement.peak_memory as f64).filter(|bytes| *bytes > 0.0),
+            // Bytes in the record, MiB in tables.
+            "peak_memory" => {
+                Some(measurement.peak_memory as f64 / f64::from(1 << 20)).filter(|mebibytes| *mebibytes > 0.0)
+            }
             _ => None,
         }
     }
@@ -107,7 +118,7 @@ pub fn label(value: &Value) -> String {
         Value::Null => "none".into(),
         Value::Bool(flag) => if *flag { "yes" } else { "no" }.into(),
         Value::Number(number) => match number.as_f64() {
-            Some(value) if number.is_f64() => super::number::round(value, 6).plain(),
+            Some(value) if number.is_f64() => super::number::written(value),
             _ => number.to_string(),
         },
         Value::String(text) => text.clone(),

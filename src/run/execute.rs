@@ -11,7 +11,7 @@ use super::store::fingerprint;
 use crate::experiment::job::{Job, JobPart, sha256};
 use crate::experiment::record::{JobResult, Measurement, Phase, Status};
 use crate::method::model::{LoadedModel, Part};
-use crate::method::{Inputs, Method, Outcome};
+use crate::method::{Failure, Inputs, Method, Outcome};
 use crate::optimize::{Iterate, Observer, StopReason};
 use std::cell::Cell;
 use std::collections::BTreeMap;
@@ -51,8 +51,8 @@ pub struct Bounds<'a> {
 
 /// Reads the files of a job and checks that they are those that it was planned with.
 ///
-/// The error is a result with status `failed` and the word `input-unreadable` or `input-changed`.
-pub fn load(job: &Job, inputs: &BTreeMap<String, PathBuf>) -> Result<LoadedModel, JobResult> {
+/// The error's kind is `input-unreadable` or `input-changed`.
+pub fn load(job: &Job, inputs: &BTreeMap<String, PathBuf>) -> Result<LoadedModel, Failure> {
     let mut model = LoadedModel::default();
     for (role, part) in &job.model {
         let part = match part {
@@ -65,20 +65,23 @@ pub fn load(job: &Job, inputs: &BTreeMap<String, PathBuf>) -> Result<LoadedModel
                 parameters,
                 ..
             } => {
-                let Some(path) = inputs.get(role) else {
-                    return Err(failure("input-unreadable", format!("no file was given for {role}")));
+                let unreadable = |reason| Failure {
+                    kind: "input-unreadable".into(),
+                    reason,
                 };
-                let bytes = std::fs::read(path)
-                    .map_err(|error| failure("input-unreadable", format!("cannot read {}: {error}", path.display())))?;
+                let Some(path) = inputs.get(role) else {
+                    return Err(unreadable(format!("no file was given for {role}")));
+                };
+                let name = path.display();
+                let bytes = std::fs::read(path).map_err(|error| unreadable(format!("cannot read {name}: {error}")))?;
                 let found = sha256(&bytes);
                 if found != *planned {
-                    return Err(failure(
-                        "input-changed",
-                        format!(
-                            "{} changed after the run was planned (SHA-256 {planned} then, {found} now); run again",
-                            path.display()
+                    return Err(Failure {
+                        kind: "input-changed".into(),
+                        reason: format!(
+                            "{name} changed after the run was planned (SHA-256 {planned} then, {found} now); run again"
                         ),
-                    ));
+                    });
                 }
                 Part::File {
                     // The bare name: a record says nothing of the folders of a machine.

@@ -161,7 +161,7 @@ fn compute(
     };
     let model = match load(&request.job, &request.inputs) {
         Ok(model) => model,
-        Err(result) => return without(result),
+        Err(error) => return without(failure(&error.kind, error.reason)),
     };
     let bounds = Bounds {
         effort: request.effort,

@@ -12,7 +12,7 @@ use crate::energy::{Energy, Variables, invariants, with_sign_of};
 use crate::linalg::lanes::{Lanes, Vector, WIDTH, load, store};
 use crate::linalg::processor::{Kernel, Processor};
 use crate::linalg::svd3::signed_svd;
-use crate::linalg::vector3::{Columns, add, apply, cofactor, dot, times};
+use crate::linalg::vector3::{Columns, add, apply, cofactor, dot, inner, times};
 
 /// Batches of eight tetrahedra per chunk; their scratch stays in the first-level cache.
 pub const CHUNK: usize = 8;
@@ -471,11 +471,10 @@ impl Kernel for Cubics<'_> {
             let d: Columns<V> = load_matrix(&self.scratch.edges[n]);
             let e: Columns<V> = load_matrix(&self.scratch.direction_edges[n]);
             let (cof_d, cof_e) = (cofactor(&d), cofactor(&e));
-            let mixed = |x: &Columns<V>, cof: &Columns<V>| dot(x[0], cof[0]) + dot(x[1], cof[1]) + dot(x[2], cof[2]);
             let inverse = V::constant(1.0) / dot(d[0], cof_d[0]);
             let cubic = [
-                mixed(&e, &cof_d) * inverse,
-                mixed(&d, &cof_e) * inverse,
+                inner(&e, &cof_d) * inverse,
+                inner(&d, &cof_e) * inverse,
                 dot(e[0], cof_e[0]) * inverse,
             ];
             store(cubic, &mut self.scratch.invariants[n]);

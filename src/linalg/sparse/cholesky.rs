@@ -1,12 +1,16 @@
 //! Numeric multifrontal Cholesky factorization and the triangular solves.
 
-use super::dense::{factorize_columns, update_triangle};
-use super::elimination::Elimination;
+use super::dense::{factorize_columns, update_rectangle, update_triangle};
+use super::elimination::{Elimination, strip_start, strip_width};
 use super::pattern::BlockPattern;
 use faer::linalg::matmul::matmul;
 use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
 use faer::{Accum, MatMut, MatRef, Par};
+use rayon::prelude::*;
 use std::fmt;
+
+/// Fronts with more entries than this are assembled by several threads.
+const SHARED_FRONT: usize = 1 << 18;
 
 /// The matrix is not positive definite in floating-point arithmetic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -191,6 +195,13 @@ struct Numeric<'a, const B: usize> {
     shift: f64,
 }
 
+/// Which end of its working memory a branch leaves its update at.
+#[derive(Clone, Copy, PartialEq)]
+enum End {
+    Low,
+    High,
+}
+
 impl<const B: usize> Numeric<'_, B> {
     /// Factorizes neighbouring branches side by side. `factor` is their part of the factor, `arena` their working memory
     /// one after another; each leaves its update at the start of its own. `Err`: the first column without a positive
@@ -198,7 +209,7 @@ impl<const B: usize> Numeric<'_, B> {
     fn branches(&self, branches: &[u32], factor: &mut [f64], arena: &mut [f64]) -> Result<(), usize> {
         match branches {
             [] => Ok(()),
-            &[front] => self.branch(front as usize, factor, arena),
+            &[front] => self.branch(front as usize, factor, arena, End::Low),
             _ => {
                 let (left, right) = branches.split_at(branches.len() / 2);
                 let offset =
@@ -215,122 +226,156 @@ impl<const B: usize> Numeric<'_, B> {
         }
     }
 
-    /// Factorizes a branch of the tree and leaves its update matrix at the start of `arena`.
-    fn branch(&self, front: usize, factor: &mut [f64], arena: &mut [f64]) -> Result<(), usize> {
+    /// Factorizes a branch of the tree and leaves its update at the given end of `arena`. The children's updates pile up
+    /// at the other end, so that nothing needs to be moved.
+    fn branch(&self, front: usize, factor: &mut [f64], arena: &mut [f64], end: End) -> Result<(), usize> {
         let elimination = self.elimination;
         let children = elimination.children(front);
-        let size = elimination.update(front) * elimination.update(front);
+        let size = elimination.update_scalars(front);
         let base = elimination.value_offsets[elimination.first[front] as usize];
         let (below, panel) = factor.split_at_mut(elimination.value_offsets[front] - base);
+        let mut sources = Vec::with_capacity(children.len());
         if elimination.shared[front] {
-            let (update, rest) = arena.split_at_mut(size);
+            let (update, mut rest) = cut(arena, size, end);
             self.branches(children, below, rest)?;
-            return self.front(front, panel, update, rest, |child| elimination.arena[child]);
+            for &child in children {
+                let (source, further) = std::mem::take(&mut rest).split_at_mut(elimination.arena[child as usize]);
+                sources.push((child as usize, &*source));
+                rest = further;
+            }
+            return self.front(front, panel, update, &sources);
         }
-        let square = |child: usize| elimination.update(child) * elimination.update(child);
-        let mut held = 0;
+        let other = if end == End::Low { End::High } else { End::Low };
+        let mut rest = arena;
         for &child in children {
             let child = child as usize;
             let start = elimination.value_offsets[elimination.first[child] as usize] - base;
-            let end = elimination.value_offsets[child + 1] - base;
-            self.branch(child, &mut below[start..end], &mut arena[held..])?;
-            held += square(child);
+            let stop = elimination.value_offsets[child + 1] - base;
+            self.branch(child, &mut below[start..stop], rest, other)?;
+            let (source, further) = cut(rest, elimination.update_scalars(child), other);
+            sources.push((child, &*source));
+            rest = further;
         }
-        let (updates, rest) = arena.split_at_mut(held);
-        self.front(front, panel, &mut rest[..size], updates, square)?;
-        arena.copy_within(held..held + size, 0);
-        Ok(())
+        self.front(front, panel, cut(rest, size, end).0, &sources)
     }
 
-    /// Assembles and factorizes one front. `updates` holds the children's update matrices, `stride` apart.
+    /// Assembles and factorizes one front. `sources` are the children with their updates.
     fn front(
         &self,
         front: usize,
         panel: &mut [f64],
         update: &mut [f64],
-        updates: &[f64],
-        stride: impl Fn(usize) -> usize,
+        sources: &[(usize, &[f64])],
     ) -> Result<(), usize> {
         let elimination = self.elimination;
         let (columns, size) = (elimination.columns(front), elimination.update(front));
         let height = columns + size;
-        let start = elimination.begin[front] as usize;
-        panel.fill(0.0);
-        for column in 0..columns / B {
-            for block in self.pattern.column_offsets[start + column]..self.pattern.column_offsets[start + column + 1] {
-                let entries = &self.values[B * B * block..B * B * (block + 1)];
-                let slot = self.pattern.slots[block] as usize;
-                for c in 0..B {
-                    for row in 0..B {
-                        panel[(B * column + c) * height + B * slot + row] = entries[row * B + c];
-                    }
-                }
+        let width = strip_width(B);
+        let large = height * height > SHARED_FRONT;
+        let assemble = |(index, strip): (usize, &mut [f64])| {
+            let first = index * width;
+            strip.fill(0.0);
+            self.scatter(elimination.begin[front] as usize + first / B, strip, height, first);
+            for &(child, source) in sources {
+                self.extend_add(child, source, first, 0, strip, height);
             }
-            for c in 0..B {
-                panel[(B * column + c) * (height + 1)] += self.shift;
-            }
-        }
-        let mut offset = 0;
-        for &child in elimination.children(front) {
-            let child = child as usize;
-            self.extend_add(child, &updates[offset..], columns, 0, panel, height);
-            offset += stride(child);
+        };
+        if large {
+            panel.par_chunks_mut(width * height).enumerate().for_each(assemble);
+        } else {
+            panel.chunks_mut(width * height).enumerate().for_each(assemble);
         }
         let mut matrix = MatMut::from_column_major_slice_mut(panel, height, columns);
-        factorize_columns(matrix.as_mut()).map_err(|column| B * start + column)?;
-        if size == 0 {
-            return Ok(());
-        }
+        factorize_columns(matrix.as_mut()).map_err(|column| B * elimination.begin[front] as usize + column)?;
         let rows = matrix.as_ref().split_at_row(columns).1;
-        update_triangle(
-            MatMut::from_column_major_slice_mut(update, size, size),
-            rows,
-            Accum::Replace,
-        );
-        let mut offset = 0;
-        for &child in elimination.children(front) {
-            let child = child as usize;
-            self.extend_add(child, &updates[offset..], columns, columns, update, size);
-            offset += stride(child);
+        let mut strips = Vec::with_capacity(size.div_ceil(width));
+        let mut rest = update;
+        for first in (0..size).step_by(width) {
+            let (strip, further) = std::mem::take(&mut rest).split_at_mut((size - first) * width.min(size - first));
+            strips.push((first, strip));
+            rest = further;
+        }
+        let renew = |(first, strip): (usize, &mut [f64])| {
+            let height = size - first;
+            let width = strip.len() / height;
+            let (beside, under) = rows.split_at_row(first).1.split_at_row(width);
+            let (square, rectangle) = MatMut::from_column_major_slice_mut(strip, height, width).split_at_row_mut(width);
+            update_triangle(square, beside, Accum::Replace);
+            update_rectangle(rectangle, under, beside, Accum::Replace);
+            for &(child, source) in sources {
+                self.extend_add(child, source, columns + first, columns + first, strip, height);
+            }
+        };
+        if large {
+            strips.into_par_iter().for_each(renew);
+        } else {
+            strips.into_iter().for_each(renew);
         }
         Ok(())
     }
 
-    /// Adds a child's update to its parent's front: to the columns eliminated there (`shift == 0`) or to those above
-    /// (`shift == columns`). `target` starts at row and column `shift` of the front and is `height` high.
-    fn extend_add(
-        &self,
-        child: usize,
-        source: &[f64],
-        columns: usize,
-        shift: usize,
-        target: &mut [f64],
-        height: usize,
-    ) {
-        let size = self.elimination.update(child);
-        let runs = self.elimination.runs(child);
-        for (index, run) in runs.iter().enumerate() {
-            let first = B * run.parent as usize;
-            if (first < columns) != (shift == 0) {
-                continue;
-            }
-            for offset in 0..B * run.length as usize {
-                let from = &source[(B * run.child as usize + offset) * size..][..size];
-                let to = &mut target[(first - shift + offset) * height..][..height];
-                // The lower triangle only: this run from its own row on, then all later runs.
-                let own = B * run.length as usize - offset;
-                add(
-                    &mut to[first - shift + offset..][..own],
-                    &from[B * run.child as usize + offset..][..own],
-                );
-                for run in &runs[index + 1..] {
-                    let length = B * run.length as usize;
-                    add(
-                        &mut to[B * run.parent as usize - shift..][..length],
-                        &from[B * run.child as usize..][..length],
-                    );
+    /// Copies the matrix's columns from position `start` on into a strip of a front's columns, which begins at column
+    /// `first` of the front and is `height` high.
+    fn scatter(&self, start: usize, strip: &mut [f64], height: usize, first: usize) {
+        for (index, columns) in strip.chunks_exact_mut(B * height).enumerate() {
+            let blocks = self.pattern.column_offsets[start + index]..self.pattern.column_offsets[start + index + 1];
+            for block in blocks {
+                let entries = &self.values[B * B * block..B * B * (block + 1)];
+                let slot = B * self.pattern.slots[block] as usize;
+                for (c, column) in columns.chunks_exact_mut(height).enumerate() {
+                    for (row, target) in column[slot..slot + B].iter_mut().enumerate() {
+                        *target = entries[row * B + c];
+                    }
                 }
             }
+            for (c, column) in columns.chunks_exact_mut(height).enumerate() {
+                column[first + B * index + c] += self.shift;
+            }
+        }
+    }
+
+    /// Adds a child's update to a strip of its parent's front. The strip begins at row `top` and column `first` of the
+    /// front and is `height` high.
+    fn extend_add(&self, child: usize, source: &[f64], first: usize, top: usize, strip: &mut [f64], height: usize) {
+        let size = self.elimination.update(child);
+        let width = strip_width(B);
+        let last = first + strip.len() / height;
+        let runs = self.elimination.runs(child);
+        let start = runs.partition_point(|run| B * (run.parent + run.length) as usize <= first);
+        for (index, run) in runs.iter().enumerate().skip(start) {
+            let (from, to, length) = (B * run.child as usize, B * run.parent as usize, B * run.length as usize);
+            if to >= last {
+                break;
+            }
+            for offset in first.saturating_sub(to)..length.min(last - to) {
+                let column = from + offset;
+                // The source's strips grow shorter; `diagonal` is where the column's own row is stored.
+                let skipped = column / width;
+                let (above, tall) = (skipped * width, size - skipped * width);
+                let diagonal = strip_start(size, width, skipped) + (column - above) * (tall + 1);
+                let source = &source[diagonal..diagonal + size - column];
+                let target = &mut strip[(to + offset - first) * height..][..height];
+                // The lower triangle only: this run from the diagonal on, then all later runs.
+                add(
+                    &mut target[to + offset - top..][..length - offset],
+                    &source[..length - offset],
+                );
+                for run in &runs[index + 1..] {
+                    let (from, to, length) = (B * run.child as usize, B * run.parent as usize, B * run.length as usize);
+                    add(&mut target[to - top..][..length], &source[from - column..][..length]);
+                }
+            }
+        }
+    }
+}
+
+/// A piece of the given size from one end, and the rest.
+fn cut(slice: &mut [f64], size: usize, end: End) -> (&mut [f64], &mut [f64]) {
+    match end {
+        End::Low => slice.split_at_mut(size),
+        End::High => {
+            let (rest, piece) = slice.split_at_mut(slice.len() - size);
+            (piece, rest)
         }
     }
 }

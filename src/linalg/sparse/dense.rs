@@ -96,7 +96,7 @@ pub(super) fn update_triangle(target: MatMut<'_, f64>, rows: MatRef<'_, f64>, be
 }
 
 /// `target - left right^T`, or `-left right^T` with `Accum::Replace`.
-fn update_rectangle(target: MatMut<'_, f64>, left: MatRef<'_, f64>, right: MatRef<'_, f64>, beta: Accum) {
+pub(super) fn update_rectangle(target: MatMut<'_, f64>, left: MatRef<'_, f64>, right: MatRef<'_, f64>, beta: Accum) {
     let (rows, columns) = (target.nrows(), target.ncols());
     if rows * columns * left.ncols() <= PIECE || rows.max(columns) <= 64 {
         matmul(target, beta, left, right.transpose(), -1.0, Par::Seq);

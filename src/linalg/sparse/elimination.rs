@@ -9,10 +9,11 @@ pub(super) const ROOT: u32 = u32::MAX;
 
 /// A child's front is merged into its parent's if the merged front has at most so many columns of unknowns and at most
 /// this share of explicit zeros. Fewer, larger fronts run faster although they do more arithmetic.
-const RELAXATION: [(usize, f64); 4] = [(12, 0.8), (32, 0.4), (96, 0.12), (usize::MAX, 0.04)];
+const RELAXATION: [(usize, f64); 4] = [(18, 0.8), (60, 0.4), (200, 0.12), (usize::MAX, 0.04)];
 
-/// Branches with less than this share of all arithmetic are factorized by one thread.
-const BRANCH_SHARE: f64 = 1.0 / 32.0;
+/// Branches with less than this share of all arithmetic are factorized one after another: every branch under way holds
+/// working memory of its own, and large fronts keep all threads busy anyway.
+const BRANCH_SHARE: f64 = 0.2;
 /// Nor is a branch below this many operations worth sharing out.
 const BRANCH_OPERATIONS: f64 = 2e6;
 
@@ -22,6 +23,17 @@ pub(super) struct Run {
     pub child: u32,
     pub parent: u32,
     pub length: u32,
+}
+
+/// Columns of an update matrix that are stored side by side: each strip begins at its first diagonal entry, so that
+/// little more than the lower triangle is stored. A whole number of vertices.
+pub(super) fn strip_width(block: usize) -> usize {
+    (120 / block).max(1) * block
+}
+
+/// Where the strip after `skipped` strips starts in an update matrix of the given size.
+pub(super) fn strip_start(size: usize, width: usize, skipped: usize) -> usize {
+    skipped * width * size - width * width * (skipped * skipped.saturating_sub(1) / 2)
 }
 
 /// The fronts of a Cholesky factorization, children before parents.
@@ -200,7 +212,7 @@ impl Elimination {
             self.operations += own;
         }
         for (front, &work) in work.iter().enumerate() {
-            let own = self.update(front) * self.update(front);
+            let own = self.update_scalars(front);
             let shared =
                 self.children(front).len() > 1 && work > (self.operations * BRANCH_SHARE).max(BRANCH_OPERATIONS);
             let mut peak = 0;
@@ -211,7 +223,7 @@ impl Elimination {
                     held += self.arena[child];
                 } else {
                     peak = peak.max(held + self.arena[child]);
-                    held += self.update(child) * self.update(child);
+                    held += self.update_scalars(child);
                 }
             }
             self.arena.push(peak.max(held + own));
@@ -232,6 +244,14 @@ impl Elimination {
     /// Unknowns that a front updates.
     pub fn update(&self, front: usize) -> usize {
         (self.row_offsets[front + 1] - self.row_offsets[front]) * self.block
+    }
+
+    /// Scalars that a front's update matrix takes.
+    pub(super) fn update_scalars(&self, front: usize) -> usize {
+        let (size, width) = (self.update(front), strip_width(self.block));
+        let strips = size / width;
+        let rest = size - strips * width;
+        strip_start(size, width, strips) + rest * rest
     }
 
     /// Positions that a front updates, increasing.

@@ -16,8 +16,10 @@ mod cholesky;
 mod dense;
 mod elimination;
 mod graph;
+mod minimum_degree;
 mod nested_dissection;
 mod pattern;
+mod separator;
 
 pub use cholesky::{BlockCholesky, NotPositive};
 pub use elimination::Elimination;

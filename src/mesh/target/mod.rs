@@ -4,6 +4,8 @@
 //! A generated shape is checked: every boundary triangle has positive area on its side, seen from outside. Positions from
 //! files are only checked to be complete and finite; whether a map onto them can be free of folds is for the method.
 
+mod harmonic;
+mod layout;
 pub mod list;
 pub mod polyhedron;
 
@@ -390,7 +392,7 @@ pub fn inverted_about(boundary: &Boundary, positions: &[[f64; 3]], centre: [f64;
             let [a, b, c] =
                 boundary.triangles[triangle as usize].map(|vertex| positions[place[vertex as usize] as usize]);
             let volume = determinant([centre, a, b, c]);
-            !(volume > 0.0)
+            volume.is_nan() || volume <= 0.0
         })
         .collect()
 }

@@ -21,7 +21,8 @@ pub fn minimize(
         stopping: Stopping {
             gradient_norm: settings.gradient_tolerance,
             relative_decrement: settings.energy_tolerance,
-            iterations: settings.iterations,
+            relative_change: settings.change_tolerance,
+            iterations: settings.iteration_limit,
             ..Stopping::default()
         },
         memory: usize::try_from(settings.l_bfgs.memory).unwrap_or(usize::MAX),

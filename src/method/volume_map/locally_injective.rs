@@ -79,11 +79,11 @@ pub fn minimize(
         let evaluation = objective.describe(&x);
         trace.record(&iterate, &evaluation);
         observer.iterate(&iterate);
-        let tolerance = settings.gradient_tolerance * weight.max(1.0);
-        if gradient_norm < tolerance {
+        let (balanced, tolerance) = (objective.balanced_norm(&gradient), settings.gradient_tolerance);
+        if balanced < tolerance {
             break (
                 StopReason::Converged,
-                format!("gradient norm {gradient_norm:.3e} is below {tolerance:.3e}"),
+                format!("balanced gradient norm {balanced:.3e} is below {tolerance:.3e}"),
             );
         }
         let change = before.map_or(f64::INFINITY, |before| before - value);
@@ -96,10 +96,10 @@ pub fn minimize(
         if let Some(stop) = observer.stop() {
             break (stop, "stopped from outside".to_string());
         }
-        if iterations >= settings.iterations {
+        if iterations >= settings.iteration_limit {
             break (
                 StopReason::StepLimit,
-                format!("{} iterations were not enough", settings.iterations),
+                format!("{} iterations were not enough", settings.iteration_limit),
             );
         }
 

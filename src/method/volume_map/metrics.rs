@@ -1,7 +1,7 @@
 //! The figures that every volumetric map is described by: their definitions.
 
 use crate::energy;
-use crate::metric::{Better, Metric};
+use crate::metric::{Better, Metric, distortion, scaled_jacobian};
 use std::sync::LazyLock;
 
 const fn metric(
@@ -21,7 +21,8 @@ const fn metric(
     }
 }
 
-const FIXED: &[Metric] = &[
+/// Those that only this method has.
+const OWN: &[Metric] = &[
     metric(
         "energy",
         "E",
@@ -37,93 +38,11 @@ const FIXED: &[Metric] = &[
         "Sum over the tetrahedra of source volume, as given in the file, times the chosen energy density.",
     ),
     metric(
-        "d_aa",
-        "D_aa",
-        Some(2.0),
-        Better::Lower,
-        "Average angle distortion: mean over the source volume of s1/s3 + s3/s1, s1 and s3 the largest and smallest \
-         singular value of the Jacobian.",
-    ),
-    metric(
-        "d_ma",
-        "D_ma",
-        Some(2.0),
-        Better::Lower,
-        "Maximum angle distortion: largest s1/s3 + s3/s1 of a tetrahedron.",
-    ),
-    metric(
-        "d_av",
-        "D_av",
-        Some(2.0),
-        Better::Lower,
-        "Average volume distortion: mean over the source volume of det J + 1/det J, in the units of the files. At least \
-         r + 1/r for a volume ratio r. Undefined where a tetrahedron is inverted.",
-    ),
-    metric(
-        "d_mv",
-        "D_mv",
-        Some(2.0),
-        Better::Lower,
-        "Maximum volume distortion: largest det J + 1/det J of a tetrahedron, in the units of the files. Undefined where \
-         a tetrahedron is inverted.",
-    ),
-    metric(
-        "d_av_rescaled",
-        "D_av'",
-        Some(2.0),
-        Better::Lower,
-        "Average volume distortion after the source is scaled to the volume of the target.",
-    ),
-    metric(
-        "d_mv_rescaled",
-        "D_mv'",
-        Some(2.0),
-        Better::Lower,
-        "Maximum volume distortion after the source is scaled to the volume of the target.",
-    ),
-    metric(
-        "inverted",
-        "N_inv",
-        Some(0.0),
-        Better::Lower,
-        "Number of tetrahedra with a negative determinant.",
-    ),
-    metric(
-        "degenerate",
-        "N_flat",
-        Some(0.0),
-        Better::Lower,
-        "Number of tetrahedra whose determinant is zero to rounding: at most 1e-14 times the product of the image's three \
-         edge lengths at a vertex over that of the source, in absolute value.",
-    ),
-    metric(
         "inverted_lower_bound",
         "N_min",
         Some(0.0),
         Better::Lower,
         "Number of tetrahedra that the boundary alone forces to be inverted or flat in every map.",
-    ),
-    metric(
-        "min_determinant",
-        "min det",
-        None,
-        Better::Higher,
-        "Smallest determinant of the Jacobian, the source scaled to the volume of the target.",
-    ),
-    metric(
-        "scaled_jacobian_min",
-        "min SJ",
-        None,
-        Better::Higher,
-        "Smallest scaled Jacobian of an image tetrahedron: sqrt(2) det / product of the three edge lengths at a corner, \
-         least over the corners; 1 for the regular tetrahedron.",
-    ),
-    metric(
-        "scaled_jacobian_mean",
-        "mean SJ",
-        None,
-        Better::Higher,
-        "Mean over the image tetrahedra of their scaled Jacobians.",
     ),
     metric(
         "constraint_residual",
@@ -138,14 +57,6 @@ const FIXED: &[Metric] = &[
         Some(0.0),
         Better::Lower,
         "Largest distance of a boundary vertex to its target, over the diagonal of the target's box.",
-    ),
-    metric(
-        "mean_determinant_error",
-        "|mean det - r|/r",
-        Some(0.0),
-        Better::Lower,
-        "Relative deviation of the mean determinant from the ratio of the volume within the image's boundary to the \
-         source volume. Zero up to rounding for any map: a check of the computation.",
     ),
     metric(
         "volume_ratio",
@@ -179,7 +90,8 @@ const FIXED: &[Metric] = &[
 
 /// The metrics above, and the mean of every energy density on the map, so that maps of different energies compare.
 static ALL: LazyLock<Vec<Metric>> = LazyLock::new(|| {
-    let mut all = FIXED.to_vec();
+    let (energies, others) = OWN.split_at(2);
+    let mut all = [energies, distortion::METRICS, scaled_jacobian::METRICS, others].concat();
     for energy in energy::energies() {
         // Once in the life of the program: names of metrics live as long as it does.
         let name: &'static str = Box::leak(energy_metric(energy.name()).into_boxed_str());

@@ -29,8 +29,10 @@ pub mod untangle;
 use super::model::ModelKind;
 use super::setting::Field;
 use super::{Failure, Inputs, Method, Outcome};
+use crate::energy::Energy;
 use crate::energy::lim_barrier::LimBarrier;
 use crate::energy::mapping::{Density, MappingEnergy};
+use crate::energy::mips::Mips;
 use crate::energy::target_weighted::TargetWeighted;
 use crate::metric::Metric;
 use crate::optimize::{NewtonObjective, Observer, StopReason};
@@ -193,6 +195,34 @@ pub fn run(problem: &Problem, settings: &Settings, observer: &mut dyn Observer) 
         }
     }
 
+    if needs_positive && !mapping.value(positions.as_flattened()).is_finite() {
+        // Densities that grow exponentially overflow on badly shaped tetrahedra, of which a valid start may have some.
+        observer.phase("approach");
+        let approach = Density::new(&Mips);
+        let mapping =
+            MappingEnergy::new(&problem.source, &problem.volume_weights(), approach, None).map_err(|error| {
+                Failure {
+                    kind: "invalid-input".to_string(),
+                    reason: format!("source mesh: {error}"),
+                }
+            })?;
+        let free: Vec<bool> = problem.boundary.mask.iter().map(|&on_boundary| !on_boundary).collect();
+        let vertices = &problem.boundary.vertices;
+        let mut objective =
+            MapObjective::new(mapping, &problem.source, &free, vertices, &positions, Hessian::OnDemand)?;
+        let solution =
+            projected_newton::minimize(&mut objective, settings, &positions, observer, &mut Trace::default());
+        positions = objective.positions(&solution.x);
+        counters.set("approach_iterations", solution.counters.iterations);
+        counters.add("factorizations", solution.counters.factorizations);
+        counters.add("evaluations", solution.counters.evaluations);
+        notices.push(format!(
+            "the energy overflows on the start, so \"{}\" was minimized first, in {} iterations",
+            Mips.name(),
+            solution.counters.iterations
+        ));
+    }
+
     observer.phase("minimize");
     let hard = settings.solver.hard_constraints();
     let free: Vec<bool> = problem
@@ -310,6 +340,10 @@ pub const COUNTERS: &[(&str, &str)] = &[
         "values of the regularization that the untangling went through",
     ),
     ("untangling_iterations", "Newton iterations of the untangling"),
+    (
+        "approach_iterations",
+        "Newton iterations on another energy, where the chosen one overflows on the start",
+    ),
     ("relaxations", "relaxations of the relaxed-newton solver"),
     (
         "weights",

@@ -12,6 +12,9 @@ use crate::optimize::{NewtonObjective, NoDirection, Objective};
 use std::cell::Cell;
 use std::rc::Rc;
 
+/// Share of the negative curvature below which none is kept.
+const LEAST_KEPT: f64 = 1.0 / 64.0;
+
 /// Springs from the boundary vertices to their targets.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Pull {
@@ -36,6 +39,8 @@ pub struct MapObjective {
     mapping: MappingEnergy,
     cholesky: BlockCholesky<3>,
     hessian: Hessian,
+    /// Share of the negative curvature to be tried next.
+    kept: f64,
     /// Coordinates of all vertices: fixed ones for good, free ones of the last point.
     positions: Vec<f64>,
     /// Three numbers a vertex: gradients and directions before they are gathered.
@@ -75,6 +80,7 @@ impl MapObjective {
             mapping,
             cholesky: BlockCholesky::new(pattern),
             hessian,
+            kept: 1.0,
             positions: positions.as_flattened().to_vec(),
             rows: vec![0.0; 3 * positions.len()],
             determinants: vec![0.0; cells],
@@ -170,6 +176,27 @@ impl MapObjective {
             }
         }
         diagonal.iter().map(|entry| entry.abs()).sum::<f64>() / diagonal.len().max(1) as f64
+    }
+
+    /// Norm of a gradient in which the slopes at pulled vertices are divided by the weight, where that exceeds 1: what
+    /// convergence is judged by, since the springs' slopes are large while their displacements are small.
+    pub fn balanced_norm(&self, gradient: &[f64]) -> f64 {
+        let total: f64 = gradient.iter().map(|slope| slope * slope).sum();
+        let Some(pull) = self.pull.as_ref().filter(|pull| pull.weight > 1.0) else {
+            return total.sqrt();
+        };
+        let (mut inside, mut pulled) = (0.0, 0.0);
+        let mut next = self.boundary.iter().peekable();
+        for (&vertex, slopes) in self.cholesky.pattern().vertices().iter().zip(gradient.chunks_exact(3)) {
+            let square: f64 = slopes.iter().map(|slope| slope * slope).sum();
+            // Both lists ascend.
+            if next.next_if_eq(&&vertex).is_some() {
+                pulled += square;
+            } else {
+                inside += square;
+            }
+        }
+        (inside + pulled / (pull.weight * pull.weight)).sqrt()
     }
 
     /// Factorizes the assembled Hessian plus `shift` on its diagonal.
@@ -273,20 +300,24 @@ impl Objective for MapObjective {
 
 impl NewtonObjective for MapObjective {
     fn newton_direction(&mut self, x: &[f64], gradient: &mut [f64], direction: &mut [f64]) -> Result<f64, NoDirection> {
-        let mut value = f64::NAN;
-        let mut factorized = false;
-        if self.hessian == Hessian::OnDemand {
-            value = self.assemble(x, gradient, 1.0);
-            if !value.is_finite() {
-                return Err(NoDirection::NotFinite);
-            }
-            factorized = self.factorize(0.0).is_ok();
-        }
-        if !factorized {
-            value = self.assemble(x, gradient, 0.0);
+        let mut kept = if self.hessian == Hessian::OnDemand {
+            self.kept
+        } else {
+            0.0
+        };
+        let mut first = true;
+        let value = loop {
+            let value = self.assemble(x, gradient, kept);
             if !value.is_finite() || gradient.iter().any(|slope| !slope.is_finite()) {
                 return Err(NoDirection::NotFinite);
             }
+            if kept == 0.0 || self.factorize(0.0).is_ok() {
+                break value;
+            }
+            kept = if kept > LEAST_KEPT { 0.25 * kept } else { 0.0 };
+            first = false;
+        };
+        if kept == 0.0 {
             // Projection may leave a vertex without any stiffness; a shift far below the others' is enough.
             let diagonal = self.mean_diagonal();
             let mut shift = 0.0;
@@ -297,6 +328,11 @@ impl NewtonObjective for MapObjective {
                 }
             }
         }
+        self.kept = if first {
+            (4.0 * kept).clamp(LEAST_KEPT, 1.0)
+        } else {
+            kept
+        };
         for (direction, slope) in direction.iter_mut().zip(&*gradient) {
             *direction = -slope;
         }

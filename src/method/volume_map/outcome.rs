@@ -8,14 +8,12 @@ use crate::energy::{self, Energy};
 use crate::linalg::vector3::{cofactor, dot};
 use crate::mesh::connectivity::Boundary;
 use crate::mesh::format::{Cells, vtu};
-use crate::mesh::quality::scaled_jacobian;
 use crate::mesh::{self, TetrahedralMesh, TriangleMesh};
 use crate::method::Failure;
+use crate::metric::distortion::distortion;
+use crate::metric::scaled_jacobian::ScaledJacobians;
 use nalgebra::Matrix3;
 use std::collections::BTreeMap;
-
-/// A determinant at most this times the product of edge lengths, image over source, is zero to rounding.
-const FLAT: f64 = 1e-14;
 
 /// A map in the units of the files with what follows from it.
 pub struct Measured {
@@ -49,10 +47,23 @@ pub fn measure(problem: &Problem, settings: &Settings, positions: &[[f64; 3]]) -
     let mut mapping = MappingEnergy::new(&rest, &weights, Density::new(density), None).map_err(failure)?;
     let flat = positions.as_flattened();
     let cells = rest.cells.len();
-    let mut determinants = vec![0.0; cells];
-    let mut singular_values = vec![0.0; 3 * cells];
-    mapping.determinants(flat, &mut determinants);
-    mapping.singular_values(flat, &mut singular_values);
+    let measured = distortion(
+        &TetrahedralMesh {
+            points: problem.given.clone(),
+            cells: rest.cells.clone(),
+        },
+        &given,
+        problem.ratio,
+    )
+    .map_err(|error| Failure {
+        kind: "invalid-input".to_string(),
+        reason: format!("source mesh: {error}"),
+    })?;
+    let determinants: Vec<f64> = measured
+        .determinant
+        .iter()
+        .map(|determinant| determinant / problem.ratio)
+        .collect();
 
     let mut metrics = BTreeMap::new();
     let mut set = |name: &str, value: f64| {
@@ -87,76 +98,27 @@ pub fn measure(problem: &Problem, settings: &Settings, positions: &[[f64; 3]]) -
     let given_volume = problem.unit.powi(3) / problem.ratio;
     set("energy_integral", given_volume * mean(&weights));
 
-    // Singular values in the units of the files.
-    let stretch = problem.ratio.cbrt();
-    let ratios: Vec<f64> = singular_values
-        .chunks_exact(3)
-        .map(|s| {
-            let ratio = s[0] / s[2].abs();
-            ratio + 1.0 / ratio
-        })
-        .collect();
-    let average = |values: &[f64]| {
-        weights
-            .iter()
-            .zip(values)
-            .map(|(weight, value)| weight * value)
-            .sum::<f64>()
-    };
-    let largest = |values: &[f64]| values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    set("d_aa", average(&ratios));
-    set("d_ma", largest(&ratios));
     let inverted: Vec<u32> = (0..cells as u32)
         .filter(|&cell| !(determinants[cell as usize] > 0.0))
         .collect();
-    let volume_distortions = |factor: f64| -> Vec<f64> {
-        determinants
-            .iter()
-            .map(|&determinant| factor * determinant + 1.0 / (factor * determinant))
-            .collect()
-    };
-    let (as_given, rescaled) = (volume_distortions(stretch.powi(3)), volume_distortions(1.0));
-    let defined = |value: f64| if inverted.is_empty() { value } else { f64::NAN };
-    set("d_av", defined(average(&as_given)));
-    set("d_mv", defined(largest(&as_given)));
-    set("d_av_rescaled", defined(average(&rescaled)));
-    set("d_mv_rescaled", defined(largest(&rescaled)));
-
-    set(
-        "inverted",
-        determinants.iter().filter(|&&determinant| determinant < 0.0).count() as f64,
-    );
-    let degenerate = rest.cells.iter().zip(&determinants).filter(|&(&cell, &determinant)| {
-        let edges = |points: &[[f64; 3]]| {
-            let [a, b, c, d] = cell.map(|vertex| points[vertex as usize]);
-            [b, c, d]
-                .iter()
-                .map(|&point| mesh::length(mesh::subtract(point, a)))
-                .product::<f64>()
-        };
-        determinant.abs() <= FLAT * edges(positions) / edges(&rest.points)
-    });
-    set("degenerate", degenerate.count() as f64);
+    set("d_aa", measured.d_aa);
+    set("d_ma", measured.d_ma);
+    set("d_av", measured.d_av);
+    set("d_mv", measured.d_mv);
+    set("d_av_rescaled", measured.d_av_rescaled);
+    set("d_mv_rescaled", measured.d_mv_rescaled);
+    set("inverted", measured.inverted as f64);
+    set("degenerate", measured.degenerate as f64);
     set("inverted_lower_bound", problem.obstacles.lower_bound as f64);
-    set(
-        "min_determinant",
-        determinants.iter().copied().fold(f64::INFINITY, f64::min),
-    );
+    set("min_determinant", measured.min_determinant);
 
     let image = TetrahedralMesh {
         points: given.clone(),
         cells: rest.cells.clone(),
     };
-    let jacobians: Vec<f64> = image
-        .cells
-        .iter()
-        .map(|&cell| scaled_jacobian(image.corners(cell)))
-        .collect();
-    set(
-        "scaled_jacobian_min",
-        jacobians.iter().copied().fold(f64::INFINITY, f64::min),
-    );
-    set("scaled_jacobian_mean", jacobians.iter().sum::<f64>() / cells as f64);
+    let jacobians = ScaledJacobians::of_tetrahedra(&image);
+    set("scaled_jacobian_min", jacobians.min);
+    set("scaled_jacobian_mean", jacobians.mean);
 
     let distances: Vec<f64> = problem
         .boundary
@@ -187,7 +149,7 @@ pub fn measure(problem: &Problem, settings: &Settings, positions: &[[f64; 3]]) -
     let enclosed = enclosed_volume(&problem.boundary, positions);
     set(
         "mean_determinant_error",
-        (average(&determinants) / enclosed - 1.0).abs(),
+        (measured.mean_determinant / problem.ratio / enclosed - 1.0).abs(),
     );
     set("volume_ratio", problem.ratio);
     set("vertices", rest.points.len() as f64);
@@ -206,11 +168,11 @@ pub fn measure(problem: &Problem, settings: &Settings, positions: &[[f64; 3]]) -
         },
         &[("source", 3, problem.given.as_flattened())],
         &[
-            ("angle_distortion", 1, &ratios),
-            ("volume_distortion", 1, &as_given),
+            ("angle_distortion", 1, &measured.angle_distortion),
+            ("volume_distortion", 1, &measured.volume_distortion),
             ("determinant", 1, &determinants),
             ("energy_density", 1, &densities),
-            ("scaled_jacobian", 1, &jacobians),
+            ("scaled_jacobian", 1, &jacobians.cells),
             ("inverted", 1, &flags),
         ],
     );

@@ -1,8 +1,9 @@
 //! Projected Newton with hard constraints: the boundary stands on its target, the interior moves.
 //!
-//! The direction comes from the Hessian itself where that is positive definite, else from one whose negative
-//! eigenvalues are taken away in every tetrahedron (Smith, de Goes, Kim 2019); the first step tried is at most 0.9 of
-//! the largest that inverts no tetrahedron (Smith, Schaefer 2015), then halved until the energy has decreased enough.
+//! The negative eigenvalues of every tetrahedron's Hessian are known (Smith, de Goes, Kim 2019). By default as large a
+//! share of them is kept as leaves the whole positive definite: all of them near a minimum, where convergence is then
+//! quadratic, none where that fails. The first step tried is at most 0.9 of the largest that inverts no tetrahedron
+//! (Smith, Schaefer 2015), then halved until the energy has decreased enough.
 //!
 //! Guaranteed: the energy never increases; no tetrahedron is inverted if none was and the energy or its barrier forbids
 //! it. Not guaranteed: a global minimum.
@@ -25,7 +26,8 @@ pub fn minimize(
         stopping: Stopping {
             gradient_norm: settings.gradient_tolerance,
             relative_decrement: settings.energy_tolerance,
-            iterations: settings.iterations,
+            relative_change: settings.change_tolerance,
+            iterations: settings.iteration_limit,
             ..Stopping::default()
         },
         ..Newton::default()

@@ -6,8 +6,8 @@
 //! on; if the step is still refused it takes one by the energy alone. The weight may be raised from a small value, each
 //! time the method has converged off the target.
 //!
-//! Converged when the norm of the gradient, divided by the weight where that exceeds 1, or the change of the energy is
-//! small. Guaranteed: no tetrahedron is inverted if none was and the energy or the barrier forbids it. Not guaranteed:
+//! Converged when the norm of the gradient, its slopes at the boundary divided by the weight where that exceeds 1, or the
+//! change of the energy is small. Guaranteed: no tetrahedron is inverted if none was and the energy or the barrier forbids it. Not guaranteed:
 //! that the boundary reaches its target; the residual is reported.
 
 use super::objective::{MapObjective, Pull};
@@ -144,7 +144,7 @@ impl Run<'_> {
             weight,
             targets: problem.targets.clone(),
         }));
-        let tolerance = settings.gradient_tolerance * weight.max(1.0);
+        let tolerance = settings.gradient_tolerance;
         let change = self.options.energy_tolerance * problem.source_diagonal();
         self.evaluations += 1;
         let mut value = self.objective.gradient(&self.x, &mut self.gradient);
@@ -159,10 +159,11 @@ impl Run<'_> {
                 );
             }
             self.tell(value, gradient_norm, step);
-            if gradient_norm < tolerance {
+            let balanced = self.objective.balanced_norm(&self.gradient);
+            if balanced < tolerance {
                 return (
                     StopReason::Converged,
-                    format!("gradient norm {gradient_norm:.3e} is below {tolerance:.3e} at weight {weight:.3e}"),
+                    format!("balanced gradient norm {balanced:.3e} is below {tolerance:.3e} at weight {weight:.3e}"),
                 );
             }
             if decrease < change {
@@ -174,10 +175,10 @@ impl Run<'_> {
             if let Some(stop) = self.observer.stop() {
                 return (stop, "stopped from outside".to_string());
             }
-            if self.iterations >= settings.iterations {
+            if self.iterations >= settings.iteration_limit {
                 return (
                     StopReason::StepLimit,
-                    format!("{} iterations were not enough", settings.iterations),
+                    format!("{} iterations were not enough", settings.iteration_limit),
                 );
             }
             let mut update = self.update(self.options.gradient_criterion);

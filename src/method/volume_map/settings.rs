@@ -184,7 +184,7 @@ pub static FIELDS: &[Field] = &[
               Preset best: true, paper: false.",
     },
     Field {
-        name: "iterations",
+        name: "iteration_limit",
         kind: Kind::Integer { min: 0, max: 1_000_000 },
         default: Default::Integer(500),
         doc: "The largest number of iterations of the minimization.",
@@ -194,8 +194,8 @@ pub static FIELDS: &[Field] = &[
         kind: Kind::Number { min: 0.0, max: 1e6 },
         default: Default::Number(1e-8),
         doc: "Converged when the norm of the gradient over the free unknowns is below it, lengths in units of the cube \
-              root of the target's volume. With soft constraints the norm is divided by the constraints' weight when \
-              that exceeds 1.",
+              root of the target's volume. With soft constraints the slopes at the boundary are divided by the \
+              constraints' weight where that exceeds 1.",
     },
     Field {
         name: "energy_tolerance",
@@ -203,6 +203,13 @@ pub static FIELDS: &[Field] = &[
         default: Default::Number(1e-15),
         doc: "Solvers with hard constraints: converged when the predicted decrease of a step, divided by the energy, is \
               below it.",
+    },
+    Field {
+        name: "change_tolerance",
+        kind: Kind::Number { min: 0.0, max: 1.0 },
+        default: Default::Number(0.0),
+        doc: "Solvers with hard constraints: converged when a step lowers the energy by less than this share of it. The \
+              default 0 switches the criterion off.",
     },
     Field {
         name: "projected-newton",
@@ -394,7 +401,7 @@ const HESSIANS: &[(&str, &str)] = &[
     ),
     (
         "on-demand",
-        "the Hessian itself where it is positive definite, else the projected one",
+        "as much of the negative curvature is kept as leaves the whole positive definite",
     ),
 ];
 
@@ -558,9 +565,10 @@ pub struct Settings {
     pub split: Split,
     pub on_infeasible: OnInfeasible,
     pub untangle: bool,
-    pub iterations: u64,
+    pub iteration_limit: u64,
     pub gradient_tolerance: f64,
     pub energy_tolerance: f64,
+    pub change_tolerance: f64,
     #[serde(rename = "projected-newton")]
     pub projected_newton: ProjectedNewton,
     #[serde(rename = "relaxed-newton")]
@@ -680,7 +688,7 @@ impl Settings {
             }
         }
         if !self.solver.hard_constraints() {
-            drop(&["energy_tolerance"]);
+            drop(&["energy_tolerance", "change_tolerance"]);
         }
         // Written with the words they stand for, so that `auto` and its meaning share a key.
         let barrier = if self.with_barrier() {

@@ -1,4 +1,4 @@
-//! Result meshes in few bytes: connectivity once per distinct mesh, positions in 14 bits, fields in 6 or 7, deflated, base64.
+//! Result meshes in few bytes: connectivity once per distinct mesh, positions in 13 bits, fields in 5 to 7, deflated, base64.
 //!
 //! Cells are sorted along a space-filling curve and points numbered as the cells first use them, so that differences of
 //! neighbours are small. Byte planes are stored one after the other, which deflate likes. Exact figures are in the VTU file.
@@ -10,14 +10,18 @@ use flate2::{Compression, write::DeflateEncoder};
 use std::io::Write;
 
 /// Steps of a coordinate within its bounds.
-pub const STEPS: f64 = 16_383.0;
+pub const STEPS: f64 = 8_191.0;
 
 /// The level of an undefined value.
 const UNDEFINED: u8 = 127;
 
 /// The highest level of a field's values: finer where a page has few of them.
 pub fn levels(values: usize) -> u8 {
-    if values < 400_000 { 126 } else { 62 }
+    match values {
+        0..250_000 => 126,
+        250_000..500_000 => 62,
+        _ => 30,
+    }
 }
 
 /// A mesh in the order in which it is stored.
@@ -154,7 +158,7 @@ pub fn topology(solid: &Solid, order: &Order) -> Packed {
     }
 }
 
-/// Image positions (where there is a source), fields and the marks of inverted cells.
+/// Image positions (where there is a source), fields as differences from the cell before, and the marks of inverted cells.
 pub fn image(solid: &Solid, order: &Order, ranges: &[Scale], levels: u8) -> Packed {
     let mut bytes = Vec::new();
     let mut boxes = Vec::new();
@@ -162,13 +166,17 @@ pub fn image(solid: &Solid, order: &Order, ranges: &[Scale], levels: u8) -> Pack
         boxes.push(positions(&solid.points, order, &mut bytes));
     }
     for (field, range) in solid.fields.iter().zip(ranges) {
+        let mut before = 0u8;
         bytes.extend(order.cells.iter().map(|&cell| {
             let place = range.position(field.values[cell as usize]);
-            if place.is_nan() {
+            let level = if place.is_nan() {
                 UNDEFINED
             } else {
                 (place * f64::from(levels)).round() as u8
-            }
+            };
+            let step = level.wrapping_sub(before);
+            before = level;
+            step
         }));
     }
     bytes.extend(order.cells.iter().map(|&cell| u8::from(solid.inverted[cell as usize])));

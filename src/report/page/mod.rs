@@ -72,9 +72,9 @@ pub fn write(
     }
     page.push_str("</ul></nav>\n<main>");
     for (id, name, content) in &sections {
-        let _ = write!(
+        let _ = writeln!(
             page,
-            "<section aria-labelledby=\"{id}\"><h2 id=\"{id}\">{name}</h2>{content}</section>\n"
+            "<section aria-labelledby=\"{id}\"><h2 id=\"{id}\">{name}</h2>{content}</section>"
         );
     }
     page.push_str("</main><footer><p>Written by vargeo from stored records; unrounded figures in <a href=\"jobs.csv\">jobs.csv</a>, figures for prose in <a href=\"macros.tex\">macros.tex</a>.</p></footer>\n");
@@ -247,7 +247,7 @@ fn rates(fits: &[Fit]) -> String {
             escape(&fit.y),
             escape(&fit.x),
             escape(&fit.series),
-            fit.last_pair.map_or_else(String::new, |last| rate(last))
+            fit.last_pair.map_or_else(String::new, rate)
         );
         if spread {
             let seeds = fit.spread.map_or_else(String::new, |(low, high, count)| {

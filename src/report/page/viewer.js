@@ -54,7 +54,8 @@
     const job = data.jobs[j], m = data.meshes[job.mesh], mesh = await topology(job.mesh), bytes = await inflate("job-" + j);
     let at = 0, image = mesh.source;
     if (job.box) { image = positions(bytes, 0, m.points, job.box); at = 6 * m.points; }
-    const fields = job.fields.map((_, i) => bytes.subarray(at + i * m.cells, at + (i + 1) * m.cells));
+    const fields = job.fields.map((_, i) => bytes.slice(at + i * m.cells, at + (i + 1) * m.cells));
+    for (const f of fields) for (let i = 1; i < f.length; i++) f[i] += f[i - 1];
     return results[j] = { job, mesh, image, fields, inverted: bytes.subarray(at + fields.length * m.cells) };
   };
 

@@ -10,8 +10,8 @@ pub mod solid;
 use solid::Solid;
 
 /// Size of a poster in pixels.
-pub const WIDTH: usize = 420;
-pub const HEIGHT: usize = 350;
+pub const WIDTH: usize = 360;
+pub const HEIGHT: usize = 300;
 
 /// The direction from the mesh to the eye; the page's viewer begins with the same.
 pub const EYE: [f64; 3] = [0.56, -0.70, 0.44];
@@ -23,5 +23,5 @@ pub fn poster(solid: &Solid, field: Option<usize>, scale: colour::Scale) -> Resu
     let facets = cut::facets(solid, &solid.points, plane.as_ref());
     let pixels = raster::render(&facets, solid, field, scale, EYE, (WIDTH * FINER, HEIGHT * FINER));
     let shrunk = image::shrink_clear(&pixels, WIDTH * FINER, HEIGHT * FINER, FINER);
-    image::palette_png(&shrunk, WIDTH, HEIGHT, 48)
+    image::palette_png(&shrunk, WIDTH, HEIGHT, 32)
 }

@@ -142,9 +142,9 @@ fn split(cell: &[u32], faces: Faces, tetrahedra: &mut Vec<[u32; 4]>) {
         if corners.contains(&apex) {
             continue;
         }
-        match corners.as_slice() {
-            &[a, b, c] => tetrahedra.push([a, b, c, apex]),
-            &[a, b, c, d] => tetrahedra.extend(halves([a, b, c, d]).map(|[a, b, c]| [a, b, c, apex])),
+        match *corners.as_slice() {
+            [a, b, c] => tetrahedra.push([a, b, c, apex]),
+            [a, b, c, d] => tetrahedra.extend(halves([a, b, c, d]).map(|[a, b, c]| [a, b, c, apex])),
             _ => {}
         }
     }

@@ -177,7 +177,7 @@ fn logarithmic_ticks(low: f64, high: f64) -> Vec<Tick> {
         for factor in 1..10 {
             let value = f64::from(factor) * power(exponent);
             if inside(value) {
-                let label = matches!(factor, 1 | 2 | 5).then(|| round(value, 3).unicode());
+                let label = matches!(factor, 1 | 2 | 5).then(|| round(value, 1).unicode());
                 ticks.push(Tick { value, label });
             }
         }

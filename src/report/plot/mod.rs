@@ -199,12 +199,12 @@ fn figures(plot: &Plot, chosen: &[&Row], categories: &mut Vec<String>, notes: &m
     let numeric = chosen
         .iter()
         .filter(|row| row.done())
-        .all(|row| row.figure(&plot.x).is_some());
+        .all(|row| row.coordinate(&plot.x).is_some());
     let mut series: Vec<(Series, Vec<Vec<f64>>)> = Vec::new();
     let mut without = Vec::new();
     for row in chosen {
         let x = if numeric {
-            row.figure(&plot.x)
+            row.coordinate(&plot.x)
         } else {
             row.axis(&plot.x).map(|value| {
                 let name = label(value);

@@ -332,6 +332,13 @@ pub fn mean_and_deviation(values: &[f64]) -> (f64, f64) {
 /// Marks the best figure of each group: the lines that differ in the last row axis only.
 fn best_figures(lines: &[Line], quantities: &[Quantity]) -> Vec<Vec<bool>> {
     let mut best = vec![vec![false; quantities.len()]; lines.len()];
+    // Along numbers a table is a study, not a contest.
+    if lines
+        .iter()
+        .all(|line| line.axes.last().is_none_or(|value| value.is_some_and(Value::is_number)))
+    {
+        return best;
+    }
     for (column, quantity) in quantities.iter().enumerate() {
         let sign = match quantity.better {
             Better::Lower => 1.0,

@@ -264,7 +264,9 @@ fn fault(name: &str, error: &io::Error) -> Fault {
 /// Verifies every byte of an entry and returns its record.
 fn read_entry(entry: &Path, key: &Key) -> Result<Record, Fault> {
     match std::fs::symlink_metadata(entry) {
-        Err(error) if error.kind() == io::ErrorKind::NotFound => return Err(Fault::Absent),
+        Err(error) if matches!(error.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory) => {
+            return Err(Fault::Absent);
+        }
         Err(error) => {
             return Err(Fault::Unreadable(format!(
                 "{} cannot be read: {error}",

@@ -3,6 +3,7 @@
 use super::super::binary::Scalar;
 use super::super::{CellKind, Content, Fault};
 use super::{Reading, code, shape};
+use crate::mesh::bounding_box;
 use std::collections::BTreeSet;
 use std::io::Write as _;
 
@@ -182,7 +183,7 @@ pub(super) fn write(content: &Content, labels: &[i64], out: &mut Vec<u8>) {
 
     // Writing to memory cannot fail.
     let _ = writeln!(out, "$Entities\n0 0 {surfaces} {}", count_of(3));
-    let (low, high) = bounds(&content.points);
+    let [low, high] = bounding_box(&content.points).unwrap_or_default();
     for (place, &(dimension, label)) in entities.iter().enumerate() {
         let _ = write!(out, "{}", tag(place, dimension));
         for value in low.iter().chain(&high) {
@@ -247,18 +248,4 @@ pub(super) fn write(content: &Content, labels: &[i64], out: &mut Vec<u8>) {
         }
     }
     out.extend_from_slice(b"$EndElements\n");
-}
-
-fn bounds(points: &[[f64; 3]]) -> ([f64; 3], [f64; 3]) {
-    let Some(first) = points.first() else {
-        return ([0.0; 3], [0.0; 3]);
-    };
-    let mut bounds = (*first, *first);
-    for point in points {
-        for axis in 0..3 {
-            bounds.0[axis] = bounds.0[axis].min(point[axis]);
-            bounds.1[axis] = bounds.1[axis].max(point[axis]);
-        }
-    }
-    bounds
 }

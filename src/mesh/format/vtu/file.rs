@@ -1,40 +1,21 @@
-//! VTU: VTK's unstructured grid in XML, the format of results.
-//!
-//! Read: ASCII, inline base64 and appended (raw or base64) arrays, uncompressed or compressed by zlib, both byte orders, both
-//! header types; one piece. Written: inline base64, little-endian, blocks of 32 KiB compressed by zlib, 64-bit headers, so
-//! that the file is valid XML, every number keeps its bits, and the same content gives the same bytes.
-//! Source: the VTK user's guide, 11th edition, section 19.3, "XML file formats".
+//! The arrays of a VTU file: their tags and the decoding of their numbers.
 
-use super::binary::{self, Order, Scalar};
-use super::cells::Sorter;
-use super::text::Text;
-use super::{Cells, Content, Fault, Field, Written, vtk};
+use super::super::Fault;
+use super::super::binary::{self, Order, Scalar};
+use super::super::text::Text;
+use super::BASE64;
 use base64::Engine as _;
-use base64::alphabet::STANDARD;
-use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
 use quick_xml::events::{BytesStart, Event};
 use quick_xml::{Reader, XmlVersion};
 use std::cell::Cell;
-use std::fmt::Write as _;
-use std::io::{Read as _, Write as _};
+use std::io::Read as _;
 
-const BASE64: GeneralPurpose = GeneralPurpose::new(
-    &STANDARD,
-    GeneralPurposeConfig::new().with_decode_padding_mode(DecodePaddingMode::Indifferent),
-);
-const BLOCK: usize = 1 << 15;
 /// No stream of deflate grows by more than this factor (RFC 1951: 258 bytes from two bits).
 const MOST_GROWTH: usize = 1040;
 
-/// Whether the bytes start as XML or a VTK XML file does.
-pub(super) fn sniff(bytes: &[u8]) -> bool {
-    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes).trim_ascii_start();
-    bytes.starts_with(b"<?xml") || bytes.starts_with(b"<VTKFile")
-}
-
 /// Where an array belongs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Part {
+pub(super) enum Part {
     Points,
     Cells,
     PointData,
@@ -43,7 +24,7 @@ enum Part {
 
 /// How an array's numbers are written.
 #[derive(Clone, Copy, Debug)]
-enum Form {
+pub(super) enum Form {
     Ascii,
     Inline,
     Appended(usize),
@@ -51,13 +32,13 @@ enum Form {
 
 /// An array as its tag describes it.
 #[derive(Debug)]
-struct Array {
+pub(super) struct Array {
     /// Where the tag stands.
-    at: usize,
-    name: String,
-    part: Part,
+    pub(super) at: usize,
+    pub(super) name: String,
+    pub(super) part: Part,
     scalar: Scalar,
-    components: usize,
+    pub(super) components: usize,
     form: Form,
     /// The text between the tags.
     start: usize,
@@ -65,116 +46,23 @@ struct Array {
 }
 
 /// A file whose numbers are still to be decoded.
-struct File<'a> {
+pub(super) struct File<'a> {
     bytes: &'a [u8],
     order: Order,
     header: Scalar,
     compressed: bool,
-    points: usize,
-    cells: usize,
-    arrays: Vec<Array>,
+    pub(super) points: usize,
+    pub(super) cells: usize,
+    pub(super) arrays: Vec<Array>,
     /// Where the appended data start, and whether they are raw.
     appended: Option<(usize, bool)>,
-    notices: Vec<String>,
+    pub(super) notices: Vec<String>,
     /// The bytes of all arrays decoded so far, as they stand in the file.
     decoded: Cell<usize>,
 }
 
-/// Reads a file.
-pub(super) fn read(bytes: &[u8]) -> Result<Content, Fault> {
-    let file = File::parse(bytes)?;
-    let points = read_points(&file)?;
-    let sorter = read_cells(&file, points.len())?;
-    let mut point_data = Vec::new();
-    let mut cell_data = Vec::new();
-    for array in &file.arrays {
-        let (rows, fields) = match array.part {
-            Part::PointData => (file.points, &mut point_data),
-            Part::CellData => (file.cells, &mut cell_data),
-            Part::Points | Part::Cells => continue,
-        };
-        fields.push(Field {
-            name: array.name.clone(),
-            components: array.components,
-            values: file.reals(array, rows, false)?,
-        });
-    }
-    let mut content = sorter.finish(points, point_data, cell_data)?;
-    content.notices.extend(file.notices);
-    Ok(content)
-}
-
-fn read_points(file: &File<'_>) -> Result<Vec<[f64; 3]>, Fault> {
-    let Some(array) = file.arrays.iter().find(|array| array.part == Part::Points) else {
-        if file.points == 0 {
-            return Ok(Vec::new());
-        }
-        return Err(Fault::whole("there is no array of points; the file is incomplete"));
-    };
-    if array.components != 3 {
-        return Err(Fault::text(
-            array.at,
-            format!("points have {} coordinates here; write three", array.components),
-        ));
-    }
-    let values = file.reals(array, file.points, true)?;
-    if let Some(bad) = values.iter().position(|value| !value.is_finite()) {
-        return Err(Fault::text(
-            array.at,
-            format!(
-                "coordinate {} of point {} (from 0) is {}, not a finite number",
-                bad % 3,
-                bad / 3,
-                values[bad]
-            ),
-        ));
-    }
-    Ok(values.as_chunks().0.to_vec())
-}
-
-fn read_cells(file: &File<'_>, points: usize) -> Result<Sorter, Fault> {
-    let mut sorter = Sorter::default();
-    if file.cells == 0 {
-        return Ok(sorter);
-    }
-    let offsets_array = file.cell_array("offsets")?;
-    let offsets = file.integers(offsets_array, file.cells)?;
-    let types = file.integers(file.cell_array("types")?, file.cells)?;
-    let connectivity_array = file.cell_array("connectivity")?;
-    let length = usize::try_from(offsets.last().copied().unwrap_or(0))
-        .map_err(|_| Fault::text(offsets_array.at, "the last offset is negative; the file is damaged"))?;
-    let connectivity = file.integers(connectivity_array, length)?;
-    let mut corners = Vec::new();
-    let mut start = 0;
-    for (cell, (&end, &code)) in offsets.iter().zip(&types).enumerate() {
-        let range = usize::try_from(end).ok().and_then(|end| connectivity.get(start..end));
-        let Some(indices) = range else {
-            return Err(Fault::text(
-                offsets_array.at,
-                format!("the offset of cell {cell} (from 0) is {end}; it must lie between {start} and {length}"),
-            ));
-        };
-        start += indices.len();
-        corners.clear();
-        for &index in indices {
-            match u32::try_from(index) {
-                Ok(corner) if (corner as usize) < points => corners.push(corner),
-                _ => {
-                    return Err(Fault::text(
-                        connectivity_array.at,
-                        format!("cell {cell} (from 0) names point {index}; there are {points}, counted from 0"),
-                    ));
-                }
-            }
-        }
-        vtk::add_cell(&mut sorter, code, &corners)
-            .map_err(|message| Fault::text(connectivity_array.at, format!("cell {cell} (from 0): {message}")))?;
-    }
-    Ok(sorter)
-}
-
 impl<'a> File<'a> {
-    fn parse(bytes: &'a [u8]) -> Result<File<'a>, Fault> {
+    pub(super) fn parse(bytes: &'a [u8]) -> Result<File<'a>, Fault> {
         let mut file = File {
             bytes,
             order: Order::Little,
@@ -397,7 +285,7 @@ impl<'a> File<'a> {
         Ok(())
     }
 
-    fn cell_array(&self, name: &str) -> Result<&Array, Fault> {
+    pub(super) fn cell_array(&self, name: &str) -> Result<&Array, Fault> {
         self.arrays
             .iter()
             .find(|array| array.part == Part::Cells && array.name == name)
@@ -405,7 +293,7 @@ impl<'a> File<'a> {
     }
 
     /// The numbers of an array of `rows` rows.
-    fn reals(&self, array: &Array, rows: usize, finite: bool) -> Result<Vec<f64>, Fault> {
+    pub(super) fn reals(&self, array: &Array, rows: usize, finite: bool) -> Result<Vec<f64>, Fault> {
         let count = self.length(array, rows)?;
         if let Form::Ascii = array.form {
             let name = &array.name;
@@ -420,7 +308,7 @@ impl<'a> File<'a> {
     }
 
     /// The integers of an array of `count` numbers.
-    fn integers(&self, array: &Array, count: usize) -> Result<Vec<i64>, Fault> {
+    pub(super) fn integers(&self, array: &Array, count: usize) -> Result<Vec<i64>, Fault> {
         if let Form::Ascii = array.form {
             let name = &array.name;
             self.ascii(array, count, |text, row| {
@@ -643,123 +531,4 @@ fn count_attribute(tag: &BytesStart<'_>, at: usize, name: &str) -> Result<usize,
     text.trim()
         .parse()
         .map_err(|_| Fault::text(at, format!("{name} is {text:?}; write a number from 0")))
-}
-
-/// A field as it is written: its name, the numbers per row, and the rows one after the other.
-pub type FieldView<'a> = (&'a str, usize, &'a [f64]);
-
-/// A VTU file of `points`, `cells` and fields with one row a point or a cell (cells in the order of [`Content`]).
-///
-/// # Panics
-/// When a field does not have a row for every point or cell.
-pub fn write(
-    points: &[[f64; 3]],
-    cells: Cells<'_>,
-    point_data: &[FieldView<'_>],
-    cell_data: &[FieldView<'_>],
-) -> Vec<u8> {
-    let mut out = String::new();
-    // Writing to a string cannot fail.
-    let _ = write!(
-        out,
-        "<?xml version=\"1.0\"?>\n\
-         <VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\" \
-         compressor=\"vtkZLibDataCompressor\">\n\
-         <UnstructuredGrid>\n<Piece NumberOfPoints=\"{}\" NumberOfCells=\"{}\">\n",
-        points.len(),
-        cells.count()
-    );
-    for (part, rows, fields) in [
-        ("PointData", points.len(), point_data),
-        ("CellData", cells.count(), cell_data),
-    ] {
-        let _ = writeln!(out, "<{part}>");
-        for &(name, components, values) in fields {
-            assert_eq!(
-                values.len(),
-                rows * components,
-                "field {name:?} has a row for each point or cell"
-            );
-            write_array(
-                &mut out,
-                name,
-                "Float64",
-                components,
-                values.iter().flat_map(|value| value.to_le_bytes()),
-            );
-        }
-        let _ = writeln!(out, "</{part}>");
-    }
-    out.push_str("<Points>\n");
-    let coordinates = points.as_flattened().iter().flat_map(|value| value.to_le_bytes());
-    write_array(&mut out, "Points", "Float64", 3, coordinates);
-    out.push_str("</Points>\n<Cells>\n");
-    let corners = cells.iter().flat_map(|(_, corners)| corners);
-    write_array(
-        &mut out,
-        "connectivity",
-        "Int64",
-        1,
-        corners.flat_map(|&corner| i64::from(corner).to_le_bytes()),
-    );
-    let offsets = cells.iter().scan(0_i64, |end, (_, corners)| {
-        *end += corners.len() as i64;
-        Some(*end)
-    });
-    write_array(&mut out, "offsets", "Int64", 1, offsets.flat_map(i64::to_le_bytes));
-    write_array(
-        &mut out,
-        "types",
-        "UInt8",
-        1,
-        cells.iter().map(|(kind, _)| vtk::code(kind)),
-    );
-    out.push_str("</Cells>\n</Piece>\n</UnstructuredGrid>\n</VTKFile>\n");
-    out.into_bytes()
-}
-
-fn write_array(out: &mut String, name: &str, kind: &str, components: usize, bytes: impl Iterator<Item = u8>) {
-    let bytes: Vec<u8> = bytes.collect();
-    let mut header = vec![
-        bytes.len().div_ceil(BLOCK) as u64,
-        BLOCK as u64,
-        (bytes.len() % BLOCK) as u64,
-    ];
-    let mut packed = Vec::with_capacity(bytes.len() / 2);
-    for block in bytes.chunks(BLOCK) {
-        let before = packed.len();
-        let mut encoder = flate2::write::ZlibEncoder::new(packed, flate2::Compression::default());
-        let written = encoder.write_all(block).and_then(|()| encoder.finish());
-        packed = written.expect("memory takes every byte");
-        header.push((packed.len() - before) as u64);
-    }
-    let header: Vec<u8> = header.iter().flat_map(|size| size.to_le_bytes()).collect();
-    let _ = writeln!(
-        out,
-        "<DataArray type=\"{kind}\" Name=\"{}\" NumberOfComponents=\"{components}\" format=\"binary\">",
-        quick_xml::escape::escape(name)
-    );
-    BASE64.encode_string(header, out);
-    BASE64.encode_string(packed, out);
-    out.push_str("\n</DataArray>\n");
-}
-
-/// Writes the whole of `content`.
-pub(super) fn write_content(content: &Content) -> Result<Written, String> {
-    Ok(Written {
-        bytes: write(
-            &content.points,
-            content.cells(),
-            &views(&content.point_data),
-            &views(&content.cell_data),
-        ),
-        notices: Vec::new(),
-    })
-}
-
-fn views(fields: &[Field]) -> Vec<FieldView<'_>> {
-    fields
-        .iter()
-        .map(|field| (field.name.as_str(), field.components, field.values.as_slice()))
-        .collect()
 }

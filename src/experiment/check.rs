@@ -5,7 +5,8 @@
 
 use super::diagnostic::{Diagnostic, Source};
 use super::document::{Content, Entry, Node, Table};
-use super::nearest::suggestion;
+use super::nearest::{nearest, suggestion};
+use super::section::{EXPERIMENT, Holds};
 use super::unit;
 use crate::method::setting::{Default, Field, Kind};
 use serde_json::{Map, Value};
@@ -149,8 +150,22 @@ impl Checker {
         } else {
             format!(" in {owner}")
         };
+        let known: Vec<&str> = known.into_iter().collect();
         let message = format!("unknown key \"{}\"{place}", entry.key);
-        self.error(entry.key_span.clone(), message).help = suggestion(&entry.key, known);
+        // A key that was written under a table header and belongs above all of them.
+        let top = EXPERIMENT
+            .iter()
+            .filter(|key| !matches!(key.holds, Holds::Plain(Kind::Table(_))) && !owner.is_empty());
+        let top = top
+            .filter(|key| matches!(key.holds, Holds::Plain(_) | Holds::Method))
+            .map(|key| key.name);
+        let above = nearest(&entry.key, top).filter(|_| nearest(&entry.key, known.iter().copied()).is_none());
+        self.error(entry.key_span.clone(), message).help = match above {
+            Some(name) => Some(format!(
+                "\"{name}\" stands at the top of the file, above its first [table]"
+            )),
+            None => suggestion(&entry.key, known),
+        };
     }
 
     /// A word that is none of those known.
@@ -180,8 +195,13 @@ impl Checker {
     pub fn table<'n>(&mut self, node: &'n Node, name: &str) -> Option<&'n Table> {
         match &node.content {
             Content::Table(table) => Some(table),
-            _ => {
+            content => {
+                let doubled = matches!(content, Content::List(items)
+                    if items.iter().all(|item| matches!(item.content, Content::Table(_))));
                 self.wrong_type(node, name, "a table");
+                if let (true, Some(last)) = (doubled, self.diagnostics.last_mut()) {
+                    last.help = Some("write one pair of brackets: there is only one".to_owned());
+                }
                 None
             }
         }
@@ -315,8 +335,8 @@ impl Checker {
                             .help = Some("hold it here, or vary it as an axis, not both".to_owned());
                         continue;
                     }
-                    let value = match (&field.kind, &entry.value.content) {
-                        (Kind::Table(inner), Content::Table(table)) => self
+                    let value = match (fields_of(&field.kind), &entry.value.content) {
+                        (Some(inner), Content::Table(table)) => self
                             .fields(inner, Some(table), &dotted, entry.value.span.clone(), varied)
                             .map(Value::Object),
                         _ => self.value(&field.kind, &entry.value, &dotted),

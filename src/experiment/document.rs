@@ -75,30 +75,89 @@ pub fn parse(source: &Arc<Source>) -> Result<Table, Vec<Diagnostic>> {
     }
 }
 
-/// One error a line; within an unclosed list only the first, since the rest follow from it.
+/// One error a line; of a list or table that is never closed only its beginning, since the rest follows from it.
 fn syntax_errors(source: &Arc<Source>, errors: &[toml::de::Error]) -> Vec<Diagnostic> {
-    let runaway = errors.iter().any(|error| error.message().contains("unclosed"));
+    let runaway = |error: &toml::de::Error| {
+        let message = error.message().split(", ").next();
+        matches!(message, Some("unclosed array" | "unclosed inline table"))
+    };
+    if errors.iter().any(runaway)
+        && let Some(first) = errors
+            .iter()
+            .filter_map(toml::de::Error::span)
+            .map(|span| span.start)
+            .min()
+        && let Some(at) = opened(source.text.get(..first).unwrap_or(&source.text))
+    {
+        let what = if source.text[at..].starts_with('[') {
+            "list"
+        } else {
+            "table"
+        };
+        let error = Diagnostic::error(format!("a {what} that is never closed")).label("opened here");
+        return vec![
+            error
+                .at(source, at..at + 1)
+                .help("close it, and see that commas part its entries"),
+        ];
+    }
     let mut lines = std::collections::BTreeSet::new();
     let mut found = Vec::new();
     for error in errors {
         let span = error.span().unwrap_or(0..0);
         let (message, expected) = error.message().split_once(", ").unwrap_or((error.message(), ""));
         let mut diagnostic = Diagnostic::error(message).label(expected).at(source, span);
-        if runaway {
-            diagnostic = diagnostic.help("a list, table or text that begins on this line or above may lack its end");
-        } else if message == "duplicate key" {
+        if message == "duplicate key" {
             diagnostic = diagnostic.help("a key or table may stand only once; join the two or remove one");
+        } else if ["invalid boolean", "invalid float", "string values must be quoted"].contains(&message) {
+            diagnostic = diagnostic.help("text stands in quotes: \"...\"");
         }
         let line = diagnostic.place.as_ref().map_or(0, super::diagnostic::Place::line);
         if lines.insert(line) {
             found.push((line, diagnostic));
         }
-        if runaway {
-            break;
-        }
     }
     found.sort_by_key(|(line, _)| *line);
     found.into_iter().map(|(_, diagnostic)| diagnostic).collect()
+}
+
+/// Where the innermost list or inline table begins that is still open at the end of this part of a file. A bracket that
+/// begins a line is taken for the header of the next table, which the open list has swallowed.
+fn opened(text: &str) -> Option<usize> {
+    let bytes = text.as_bytes();
+    let mut open = Vec::new();
+    let mut at = 0;
+    while at < bytes.len() {
+        match bytes[at] {
+            b'[' | b'{' => open.push(at),
+            b']' | b'}' => {
+                open.pop();
+            }
+            b'#' => at += text[at..].find('\n').unwrap_or(text.len() - at),
+            quote @ (b'"' | b'\'') => {
+                let thrice = bytes[at..].starts_with(&[quote; 3]);
+                at += if thrice { 3 } else { 1 };
+                let ends = |at: usize| match thrice {
+                    true => bytes[at..].starts_with(&[quote; 3]),
+                    false => bytes[at] == quote || bytes[at] == b'\n',
+                };
+                while at < bytes.len() && !ends(at) {
+                    at += if quote == b'"' && bytes[at] == b'\\' { 2 } else { 1 };
+                }
+                at += if thrice { 2 } else { 0 };
+            }
+            _ => {}
+        }
+        at += 1;
+    }
+    let header = |at: usize| {
+        bytes[at] == b'['
+            && text[..at]
+                .rsplit('\n')
+                .next()
+                .is_some_and(|line| line.trim().is_empty())
+    };
+    open.iter().rev().copied().find(|&at| !header(at))
 }
 
 fn convert_table(table: &DeTable<'_>, source: &Arc<Source>, diagnostics: &mut Vec<Diagnostic>) -> Table {

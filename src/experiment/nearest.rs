@@ -4,15 +4,16 @@
 pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let plain = |text: &str| text.to_lowercase().replace(['_', ' ', '.'], "-");
     let wanted = plain(name);
-    let longest = wanted.chars().count();
+    let letters = wanted.chars().count();
     known
         .into_iter()
         .map(|candidate| {
             let plain = plain(candidate);
             let distance = strsim::damerau_levenshtein(&wanted, &plain);
             // Up to a third of the letters may be slips; a longer difference may still be an abbreviation.
-            let abbreviated = longest >= 3 && (plain.starts_with(&wanted) || wanted.starts_with(&plain));
-            let near = distance <= 1.max(longest.max(plain.chars().count()) / 3);
+            let abbreviated = letters >= 3 && (plain.starts_with(&wanted) || wanted.starts_with(&plain));
+            let longest = letters.max(plain.chars().count());
+            let near = distance <= 1.max(longest / 3) && distance < longest;
             (candidate, distance, near || abbreviated)
         })
         .filter(|(_, _, near)| *near)
@@ -23,9 +24,14 @@ pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Opti
 /// `did you mean "stretch"?`, or the known names when none is near.
 pub fn suggestion<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<String> {
     let known: Vec<&str> = known.into_iter().collect();
-    if let Some(name) = nearest(name, known.iter().copied()) {
-        return Some(format!("did you mean \"{name}\"?"));
+    match nearest(name, known.iter().copied()) {
+        Some(name) => Some(format!("did you mean \"{name}\"?")),
+        None => list(&known),
     }
+}
+
+/// The known names, as far as a line or two hold them; none when there are none.
+pub fn list(known: &[&str]) -> Option<String> {
     match known.len() {
         0 => None,
         1..=24 => Some(format!("known: {}", known.join(", "))),

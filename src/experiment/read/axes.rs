@@ -179,10 +179,12 @@ pub fn read(
         ),
         _ => None,
     });
-    let used: Vec<&Model> = models
-        .iter()
-        .filter(|model| listed.as_ref().is_none_or(|names| names.contains(&model.name)))
-        .collect();
+    let is_listed = |model: &&Model| listed.as_ref().is_none_or(|names| names.contains(&model.name));
+    let known_models = KnownModels {
+        all: models,
+        used: models.iter().filter(is_listed).collect(),
+        broken: broken_models,
+    };
     if model_axis.is_none() && !models.is_empty() {
         let values = models
             .iter()
@@ -213,7 +215,7 @@ pub fn read(
     let mut read_one = |axis: &Named<'_>, zipped: bool| -> Known {
         let (sets, meant) = resolve(checker, method, axis);
         let values = match sets {
-            Some(sets) => values(checker, method, axis, sets, models, &used, broken_models, zipped),
+            Some(sets) => values(checker, method, axis, sets, &known_models, zipped),
             None => None,
         };
         Known {
@@ -272,8 +274,11 @@ fn check_zip(checker: &mut Checker, zip: &[Named<'_>], group: &[Known]) {
     if let (true, Some(columns)) = (even, columns) {
         let row = |index: usize| columns.iter().map(|values| &values[index]).collect::<Vec<_>>();
         if let Some(copy) = (0..expected).find(|&index| (0..index).any(|earlier| row(earlier) == row(index))) {
-            let words: Vec<String> = row(copy).into_iter().map(quoted).collect();
-            let message = format!("{} stand twice in a zip", words.join(", "));
+            let words = zip
+                .iter()
+                .zip(row(copy))
+                .map(|(axis, value)| format!("{} = {}", axis.name, quoted(value)));
+            let message = format!("{} stands twice in a zip", words.collect::<Vec<_>>().join(", "));
             let span = match &zip[0].node.content {
                 Content::List(items) => items[copy].span.clone(),
                 _ => zip[0].node.span.clone(),
@@ -314,14 +319,20 @@ fn resolve(checker: &mut Checker, method: &'static dyn Method, axis: &Named<'_>)
     (None, meant.or_else(|| deeper.cloned()))
 }
 
+/// The models of a file: those that are well, those that some axis value chooses, and the names of those that are wrong.
+struct KnownModels<'a> {
+    all: &'a [Model],
+    used: Vec<&'a Model>,
+    broken: &'a BTreeSet<String>,
+}
+
+/// The values of an axis; none when any is wrong. Within a zip a value may stand twice.
 fn values(
     checker: &mut Checker,
     method: &'static dyn Method,
     axis: &Named<'_>,
     sets: Sets,
-    models: &[Model],
-    used: &[&Model],
-    broken: &BTreeSet<String>,
+    models: &KnownModels<'_>,
     zipped: bool,
 ) -> Option<Vec<Value>> {
     let Content::List(items) = &axis.node.content else {
@@ -345,36 +356,13 @@ fn values(
     let kinds: Vec<&Kind> = match sets {
         Sets::Model => Vec::new(),
         Sets::Setting(field) => vec![&field.kind],
-        Sets::Parameter { role } => {
-            let mut kinds = Vec::new();
-            let (_, name) = parameter(method, &axis.name)?;
-            for model in used {
-                match models::generator_parameter(method, model, role, name) {
-                    Ok(field) => kinds.push(&field.kind),
-                    Err(reason) => {
-                        let message = format!("axis \"{}\" does not fit model \"{}\"", axis.name, model.name);
-                        let diagnostic = checker.error(axis.span.clone(), message);
-                        diagnostic.label = reason.label;
-                        diagnostic.help = reason.help;
-                    }
-                }
-            }
-            if kinds.is_empty() {
-                if used.is_empty() && broken.is_empty() {
-                    checker
-                        .error(axis.span.clone(), format!("axis \"{}\" has no model to set", axis.name))
-                        .help = Some("generate a model under [models.NAME]".to_owned());
-                }
-                return None;
-            }
-            kinds
-        }
+        Sets::Parameter { role } => parameter_kinds(checker, method, axis, role, models)?,
     };
     let mut found: Vec<Value> = Vec::new();
     let mut well = true;
     for item in items {
         let value = match sets {
-            Sets::Model => model_name(checker, item, models, broken),
+            Sets::Model => model_name(checker, item, models),
             _ => kinds
                 .iter()
                 .map(|kind| checker.value(kind, item, &axis.name))
@@ -395,17 +383,42 @@ fn values(
     well.then_some(found)
 }
 
-fn model_name(checker: &mut Checker, item: &Node, models: &[Model], broken: &BTreeSet<String>) -> Option<Value> {
+/// The kinds that a generator's parameter has in the models that the axis sets it in.
+fn parameter_kinds(
+    checker: &mut Checker,
+    method: &'static dyn Method,
+    axis: &Named<'_>,
+    role: &str,
+    models: &KnownModels<'_>,
+) -> Option<Vec<&'static Kind>> {
+    let (_, name) = parameter(method, &axis.name)?;
+    let mut kinds = Vec::new();
+    for model in &models.used {
+        match models::generator_parameter(method, model, role, name) {
+            Ok(field) => kinds.push(&field.kind),
+            Err(reason) => {
+                let message = format!("axis \"{}\" does not fit model \"{}\"", axis.name, model.name);
+                let diagnostic = checker.error(axis.span.clone(), message);
+                diagnostic.label = reason.label;
+                diagnostic.help = reason.help;
+            }
+        }
+    }
+    if models.used.is_empty() && models.broken.is_empty() {
+        let message = format!("axis \"{}\" has no model to set", axis.name);
+        checker.error(axis.span.clone(), message).help = Some("generate a model under [models.NAME]".to_owned());
+    }
+    (!kinds.is_empty()).then_some(kinds)
+}
+
+fn model_name(checker: &mut Checker, item: &Node, models: &KnownModels<'_>) -> Option<Value> {
     let name = checker.text(item, "model")?.to_owned();
-    if models.iter().any(|model| model.name == name) {
+    if models.all.iter().any(|model| model.name == name) {
         return Some(Value::from(name));
     }
-    if !broken.contains(&name) {
-        let known: Vec<&str> = models
-            .iter()
-            .map(|model| model.name.as_str())
-            .chain(broken.iter().map(String::as_str))
-            .collect();
+    if !models.broken.contains(&name) {
+        let well = models.all.iter().map(|model| model.name.as_str());
+        let known: Vec<&str> = well.chain(models.broken.iter().map(String::as_str)).collect();
         checker.unknown_name(item.span.clone(), "model", &name, known);
     }
     None

@@ -415,7 +415,7 @@ fn file_name(checker: &mut Checker, span: Range<usize>, name: &str) -> bool {
             .all(|character| character.is_ascii_alphanumeric() || "-_.".contains(character));
     if !well {
         checker.error(span, format!("\"{name}\" cannot name a file")).help =
-            Some("use letters, digits, `-`, `_` and `.`, and begin with none of the last".to_owned());
+            Some("use letters, digits, `-`, `_` and `.`, and do not begin with a dot".to_owned());
     }
     well
 }

@@ -6,7 +6,7 @@ use crate::experiment::column;
 use crate::experiment::document::{Entry, Node, Table};
 use crate::experiment::file::{self, Bound, Plot, Rate};
 use crate::experiment::grid;
-use crate::experiment::nearest::suggestion;
+use crate::experiment::nearest::{list, suggestion};
 use crate::experiment::section::{PLOT, RATE, TABLE};
 use serde_json::Value;
 use std::collections::BTreeSet;
@@ -89,7 +89,8 @@ fn indistinct(
             .into_iter()
             .filter(|axis| !rows.contains(axis))
             .collect();
-        let message = format!("{} jobs share {} row heads", jobs.len(), heads.len());
+        let rows = if heads.len() == 1 { "row" } else { "rows" };
+        let message = format!("{} jobs fall into {} {rows}", jobs.len(), heads.len());
         checker.warning(entry.value.span.clone(), message).help = Some(format!(
             "add {} to the rows, or say which jobs with \"where\"",
             more.join(" or ")
@@ -286,7 +287,7 @@ fn coordinates(
                 .map(|column| column.name)
                 .collect()
         };
-        checker.error(entry.value.span.clone(), message).help = suggestion("", known);
+        checker.error(entry.value.span.clone(), message).help = list(&known);
     }
     (x.map(|(name, _)| name), y.map(|(name, _)| name))
 }

@@ -28,7 +28,7 @@ pub(super) struct Run {
 /// Columns of an update matrix that are stored side by side: each strip begins at its first diagonal entry, so that
 /// little more than the lower triangle is stored. A whole number of vertices.
 pub(super) fn strip_width(block: usize) -> usize {
-    (120 / block).max(1) * block
+    (240 / block).max(1) * block
 }
 
 /// Where the strip after `skipped` strips starts in an update matrix of the given size.
@@ -229,6 +229,11 @@ impl Elimination {
             self.arena.push(peak.max(held + own));
             self.shared.push(shared);
         }
+    }
+
+    /// The vertex eliminated at each position.
+    pub fn order(&self) -> &[u32] {
+        &self.order
     }
 
     /// Number of fronts.

@@ -166,7 +166,7 @@ pub fn minimize(
         let evaluation = objective.describe(&x);
         if evaluation.positional > options.constraint_tolerance {
             let wanted = options.weight_ratio * evaluation.distortion.abs() / evaluation.positional;
-            let raised = wanted.clamp(options.weight, LARGEST_WEIGHT);
+            let raised = wanted.clamp(options.weight, LARGEST_WEIGHT).max(weight);
             if raised != weight {
                 weight = raised;
                 before = None;

@@ -42,7 +42,7 @@ const OWN: &[Metric] = &[
         "N_min",
         Some(0.0),
         Better::Lower,
-        "Number of tetrahedra that the boundary alone forces to be inverted or flat in every map.",
+        "Number of tetrahedra that the boundary forces to be inverted or flat in a map that meets the target.",
     ),
     metric(
         "constraint_residual",

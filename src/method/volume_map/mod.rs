@@ -103,6 +103,9 @@ impl Method for VolumeMap {
     }
 }
 
+/// Energies of a start beyond this say nothing but that a tetrahedron is almost flat.
+const LARGEST_START: f64 = 1e50;
+
 /// Computes the map of a problem.
 pub fn run(problem: &Problem, settings: &Settings, observer: &mut dyn Observer) -> Result<Outcome, Failure> {
     let mut notices = problem.notices.clone();
@@ -114,7 +117,9 @@ pub fn run(problem: &Problem, settings: &Settings, observer: &mut dyn Observer) 
     if problem.obstacles.forbid() {
         let bound = problem.obstacles.lower_bound;
         let tetrahedra = if bound == 1 { "tetrahedron" } else { "tetrahedra" };
-        if needs_positive && settings.on_infeasible == OnInfeasible::Refuse {
+        // Soft constraints may leave the boundary off its target, so nothing is impossible.
+        let refuses = settings.on_infeasible == OnInfeasible::Refuse && settings.solver.hard_constraints();
+        if needs_positive && refuses {
             return Err(Failure {
                 kind: "infeasible".to_string(),
                 reason: format!(
@@ -195,8 +200,10 @@ pub fn run(problem: &Problem, settings: &Settings, observer: &mut dyn Observer) 
         }
     }
 
-    if needs_positive && !mapping.value(positions.as_flattened()).is_finite() {
-        // Densities that grow exponentially overflow on badly shaped tetrahedra, of which a valid start may have some.
+    // The negation catches not-a-number too.
+    if needs_positive && !(mapping.value(positions.as_flattened()) < LARGEST_START) {
+        // Densities that grow exponentially overflow on badly shaped tetrahedra, of which a valid start may have some,
+        // and long before that their derivatives are of no use.
         observer.phase("approach");
         let approach = Density::new(&Mips);
         let mapping =
@@ -217,7 +224,7 @@ pub fn run(problem: &Problem, settings: &Settings, observer: &mut dyn Observer) 
         counters.add("factorizations", solution.counters.factorizations);
         counters.add("evaluations", solution.counters.evaluations);
         notices.push(format!(
-            "the energy overflows on the start, so \"{}\" was minimized first, in {} iterations",
+            "the energy of the start is beyond all measure, so \"{}\" was minimized first, in {} iterations",
             Mips.name(),
             solution.counters.iterations
         ));

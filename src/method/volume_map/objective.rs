@@ -8,7 +8,7 @@ use crate::energy::mapping::{Density, MappingEnergy};
 use crate::linalg::sparse::{BlockCholesky, BlockPattern, NotPositive};
 use crate::mesh::TetrahedralMesh;
 use crate::method::Failure;
-use crate::optimize::{NewtonObjective, NoDirection, Objective};
+use crate::optimize::{NewtonObjective, NoDirection, Objective, norm};
 use std::cell::Cell;
 use std::rc::Rc;
 
@@ -318,12 +318,13 @@ impl NewtonObjective for MapObjective {
             first = false;
         };
         if kept == 0.0 {
-            // Projection may leave a vertex without any stiffness; a shift far below the others' is enough.
-            let diagonal = self.mean_diagonal();
+            // Projection may leave a vertex without any stiffness; a shift far below the others' is enough. Where it
+            // leaves nothing at all, the gradient sets the scale, and the direction is that of steepest descent.
+            let scale = self.mean_diagonal().max(norm(gradient));
             let mut shift = 0.0;
             while let Err(error) = self.factorize(shift) {
-                shift = if shift == 0.0 { 1e-12 * diagonal } else { 100.0 * shift };
-                if !(shift <= diagonal) {
+                shift = if shift == 0.0 { 1e-12 * scale } else { 100.0 * shift };
+                if !(shift > 0.0 && shift <= scale) {
                     return Err(error.into());
                 }
             }

@@ -15,7 +15,7 @@ use super::problem::Problem;
 use super::settings::{Continuation, RelaxedNewton, Settings};
 use super::trace::Trace;
 use crate::optimize::line_search::{Backtracking, Start};
-use crate::optimize::{Iterate, NewtonObjective, Objective, Observer, StopReason, norm};
+use crate::optimize::{Iterate, NewtonObjective, NoDirection, Objective, Observer, StopReason, norm};
 
 /// Where the method ended.
 #[derive(Clone, Debug, PartialEq)]
@@ -220,11 +220,13 @@ impl Run<'_> {
     /// One Newton step with backtracking, if one is acceptable.
     fn update(&mut self, gradient_criterion: bool) -> Update {
         self.evaluations += 1;
-        let Ok(value) = self
+        let value = match self
             .objective
             .newton_direction(&self.x, &mut self.gradient, &mut self.direction)
-        else {
-            return Update::NotFinite;
+        {
+            Ok(value) => value,
+            Err(NoDirection::NotPositive(_)) => return Update::Refused,
+            Err(NoDirection::NotFinite) => return Update::NotFinite,
         };
         let search = Backtracking {
             gradient_decrease: gradient_criterion,

@@ -747,5 +747,13 @@ pub fn check(settings: &Value) -> Vec<(String, String)> {
             "the locally-injective solver rests on the barrier; use \"auto\" or another solver",
         );
     }
+    let upright = energy::find(&settings.energy).is_none_or(|energy| energy.is_barrier());
+    if settings.weighting == Weighting::Target && settings.barrier == Barrier::None && !upright {
+        error(
+            "weighting",
+            "weighted by the image's volume, an energy without a barrier falls without bound as cells invert; use \
+             barrier = \"auto\" or another weighting",
+        );
+    }
     errors
 }

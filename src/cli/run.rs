@@ -96,11 +96,12 @@ pub(super) fn run(plan: &Plan, running: &Running) -> Result<Done, Exit> {
     let outcome = outcome.map_err(|error| wrong(&error.to_string()))?;
     repeat_warnings(&outcome);
     if outcome.interrupted {
-        let missing = plan.jobs.len() - outcome.finished.len();
+        let left = plan.jobs.len() - outcome.finished.len();
+        let skipped = |finished: &&Finished| finished.record.result.status == Status::Skipped;
+        let kept = outcome.finished.len() - outcome.finished.iter().filter(skipped).count();
+        let jobs = plan.jobs.len();
         eprintln!(
-            "interrupted: {} of {} jobs are finished and kept; the same command computes the other {missing}",
-            outcome.finished.len(),
-            plan.jobs.len()
+            "interrupted: {kept} of {jobs} jobs are finished and kept; the same command computes the other {left}"
         );
         return Ok(Done {
             exit: Exit::Interrupted,

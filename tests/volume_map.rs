@@ -60,21 +60,23 @@ fn close(name: &str, value: f64, expected: f64, tolerance: f64) {
 }
 
 /// The standard case of published tables: a bumpy twisted grid onto a cube with swirled faces.
-fn twisted_grid(divisions: u64) -> LoadedModel {
+fn onto_cube(generator: &str, parameters: Value, cube: Value) -> LoadedModel {
     let mut model = LoadedModel::default();
     let generated = |generator: &str, parameters: Value| Part::Generated {
         generator: generator.into(),
         parameters,
     };
-    model.parts.insert(
-        "mesh".into(),
-        generated("twisted-grid", json!({ "divisions": divisions })),
-    );
-    model.parts.insert(
-        "target".into(),
-        generated("cube", json!({ "swirl": 1.0, "warp": 0.12 })),
-    );
+    model.parts.insert("mesh".into(), generated(generator, parameters));
+    model.parts.insert("target".into(), generated("cube", cube));
     model
+}
+
+fn twisted_grid(divisions: u64) -> LoadedModel {
+    onto_cube(
+        "twisted-grid",
+        json!({ "divisions": divisions }),
+        json!({ "swirl": 1.0, "warp": 0.12 }),
+    )
 }
 
 fn map(model: LoadedModel, chosen: Value, observer: &mut dyn Observer) -> Result<Outcome, Failure> {
@@ -480,6 +482,47 @@ fn every_solver_tells_why_it_stopped() {
         json!({ "energy": "arap", "gradient_tolerance": 0.0, "energy_tolerance": 0.0, "iteration_limit": 100_000 });
     let stalled = map(twisted_grid(4), stuck, &mut Silent).expect("a map");
     assert_eq!(stalled.stop, "stalled", "{}", stalled.reason);
+}
+
+/// LPM has no stiffness at all where the map shrinks every length below 1/sqrt 3: the positive part of its Hessian is zero.
+#[test]
+fn a_hessian_without_any_positive_part_still_gives_a_descent() {
+    for solver in ["projected-newton", "relaxed-newton"] {
+        let ball = onto_cube("ball", json!({ "tetrahedra": 96, "radius": 2.0 }), json!({}));
+        let chosen = json!({
+            "energy": "lpm", "solver": solver, "barrier": "none", "rescale": false, "iteration_limit": 50,
+            "projected-newton": { "hessian": "projected" },
+        });
+        let outcome = map(ball, chosen, &mut Silent).expect("a map");
+        assert_ne!(outcome.stop, "not-finite", "{solver}: {}", outcome.reason);
+        let energies = &outcome.traces["energy"];
+        assert!(energies.last() < energies.first(), "{solver}: {energies:?}");
+    }
+}
+
+/// MIPS comes first where the exponential of AMIPS is far beyond use on a start that is valid.
+#[test]
+fn an_energy_beyond_measure_is_approached() {
+    let bumpy = onto_cube(
+        "bumpy",
+        json!({ "tetrahedra": 4_000, "amplitude": 0.3, "twist": 300.0 }),
+        json!({ "swirl": 1.8 }),
+    );
+    let chosen = json!({ "energy": "amips", "iteration_limit": 20 });
+    let outcome = map(bumpy, chosen, &mut Silent).expect("a map");
+    assert!(outcome.counters["approach_iterations"] > 0);
+    assert_ne!(outcome.stop, "not-finite", "{}", outcome.reason);
+    assert!(metric(&outcome, "inverted") == 0.0 && metric(&outcome, "energy").is_finite());
+}
+
+#[test]
+fn an_energy_that_falls_without_bound_is_refused() {
+    let wrong = |weighting: &str, energy: &str, barrier: &str| {
+        let chosen = json!({ "weighting": weighting, "energy": energy, "barrier": barrier });
+        VolumeMap.check(&chosen).iter().any(|(path, _)| path == "weighting")
+    };
+    assert!(wrong("target", "arap", "none"));
+    assert!(!wrong("volume", "arap", "none") && !wrong("target", "arap", "auto") && !wrong("target", "mips", "none"));
 }
 
 #[test]

@@ -7,6 +7,8 @@ pub mod linalg;
 pub mod mesh;
 pub mod energy;
 pub mod optimize;
+pub mod geometry;
+pub mod fem;
 pub mod metric;
 pub mod method;
 pub mod experiment;

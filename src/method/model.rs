@@ -1,7 +1,7 @@
 //! Models: what an experiment file may say of one, and what a method receives once its files are read.
 
-use super::setting::Field;
-use crate::mesh::{TetrahedralMesh, TriangleMesh};
+use super::setting::{Default, Field, Kind};
+use crate::mesh::generate::Parameter;
 
 /// A generator of meshes or targets: a name, its parameters, its meaning.
 #[derive(Debug)]
@@ -49,14 +49,37 @@ pub enum Part {
 }
 
 /// The parts of a model by role name.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, std::default::Default, PartialEq)]
 pub struct LoadedModel {
     pub parts: std::collections::BTreeMap<String, Part>,
 }
 
-/// A surface or a volume, as read from a file of either kind.
-#[derive(Debug, Clone, PartialEq)]
-pub enum AnyMesh {
-    Triangles(TriangleMesh),
-    Tetrahedra(TetrahedralMesh),
+/// A list that lives as long as the program, for declarations derived from the lists of generators and shapes.
+pub fn keep<T>(list: Vec<T>) -> &'static [T] {
+    Box::leak(list.into_boxed_slice())
+}
+
+/// A generator's parameters as fields.
+pub fn fields(parameters: &'static [Parameter]) -> &'static [Field] {
+    let field = |parameter: &'static Parameter| Field {
+        name: parameter.name,
+        kind: if parameter.whole {
+            Kind::Integer {
+                min: parameter.min as i64,
+                max: parameter.max as i64,
+            }
+        } else {
+            Kind::Number {
+                min: parameter.min,
+                max: parameter.max,
+            }
+        },
+        default: if parameter.whole {
+            Default::Integer(parameter.default as i64)
+        } else {
+            Default::Number(parameter.default)
+        },
+        doc: parameter.doc,
+    };
+    keep(parameters.iter().map(field).collect())
 }

@@ -1,8 +1,8 @@
 //! What a model of a volumetric map may be: a source mesh and where its boundary goes.
 
-use crate::mesh::generate::{self, Parameter};
+use crate::mesh::generate;
 use crate::mesh::target;
-use crate::method::model::{Generator, ModelKind, Role};
+use crate::method::model::{Generator, ModelKind, Role, fields, keep};
 use crate::method::setting::{Default, Field, Kind};
 use std::sync::LazyLock;
 
@@ -21,35 +21,6 @@ static MESH_FILE: &[Field] = &[Field {
     default: Default::Number(1.0),
     doc: "Factor for the coordinates in the file.",
 }];
-
-/// A list that lives as long as the program, for declarations derived from the lists of generators and shapes.
-fn keep<T>(list: Vec<T>) -> &'static [T] {
-    Box::leak(list.into_boxed_slice())
-}
-
-fn fields(parameters: &'static [Parameter]) -> &'static [Field] {
-    let field = |parameter: &'static Parameter| Field {
-        name: parameter.name,
-        kind: if parameter.whole {
-            Kind::Integer {
-                min: parameter.min as i64,
-                max: parameter.max as i64,
-            }
-        } else {
-            Kind::Number {
-                min: parameter.min,
-                max: parameter.max,
-            }
-        },
-        default: if parameter.whole {
-            Default::Integer(parameter.default as i64)
-        } else {
-            Default::Number(parameter.default)
-        },
-        doc: parameter.doc,
-    };
-    keep(parameters.iter().map(field).collect())
-}
 
 static KIND: LazyLock<ModelKind> = LazyLock::new(|| {
     let meshes = generate::generators()

@@ -1,0 +1,1 @@
+//! Finite elements: reference cells, quadrature, bases and spaces of degrees of freedom.

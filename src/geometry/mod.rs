@@ -1,0 +1,1 @@
+//! Geometry of points and surfaces: closest points, predicates, restricted Voronoi diagrams.

@@ -5,6 +5,7 @@
 
 pub mod setting;
 pub mod model;
+pub mod g1_surface;
 pub mod volume_map;
 
 use crate::metric::Metric;
@@ -89,7 +90,7 @@ pub trait Method: Sync {
 
 /// Every method, in the order of the documentation.
 pub fn methods() -> &'static [&'static dyn Method] {
-    &[&volume_map::VolumeMap]
+    &[&volume_map::VolumeMap, &g1_surface::G1Surface]
 }
 
 /// The method of this name.

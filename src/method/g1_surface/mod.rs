@@ -1,0 +1,295 @@
+//! G1 surfaces: biquartic patches with common tangent planes over any mesh of quadrilaterals with normals.
+//!
+//! The stages: [`problem`] reads the model, [`network`] spans natural cubics over the edges, [`enclosure`] moves their
+//! tangents until surfaces of class C2 can meet at every vertex, [`edge_normals`] finds a cubic normal along every curve,
+//! [`patch`] fits the patches, [`outcome`] measures them. Source: Xue, Demkowicz, Bajaj 2004, Reconstruction of G1 surfaces
+//! with biquartic patches for hp finite element simulations.
+//!
+//! Guaranteed with the default settings, where the enclosure condition could be met (a metric tells): normals of
+//! neighbouring patches agree along their whole edge to rounding, at vertices of every valence; patches share their curves
+//! exactly; the same input gives the same bits with any number of threads. Not guaranteed: that the surface is free of
+//! folds or does not meet itself.
+
+pub mod continuity;
+pub mod edge_normals;
+pub mod enclosure;
+pub mod hermite;
+pub mod least_squares;
+pub mod metrics;
+pub mod model;
+pub mod network;
+pub mod outcome;
+pub mod patch;
+pub mod problem;
+pub mod settings;
+pub mod surface;
+pub mod vertex_normals;
+
+use super::model::ModelKind;
+use super::setting::Field;
+use super::{Failure, Inputs, Method, Outcome};
+use crate::linalg::vector3::{dot, subtract};
+use crate::mesh::length;
+use crate::metric::Metric;
+use crate::optimize::Observer;
+use network::Network;
+use patch::Fitted;
+use problem::Problem;
+use rayon::prelude::*;
+use serde_json::Value;
+use settings::{EdgeNormals, Geometry, Settings, Tangents};
+use std::collections::BTreeMap;
+
+/// The method `g1-surface`.
+pub struct G1Surface;
+
+impl Method for G1Surface {
+    fn name(&self) -> &'static str {
+        "g1-surface"
+    }
+
+    fn version(&self) -> u32 {
+        1
+    }
+
+    fn summary(&self) -> &'static str {
+        "spans biquartic patches with common tangent planes over a quadrilateral mesh with normals"
+    }
+
+    fn source(&self) -> &'static str {
+        "Reconstruction of G1 surfaces with biquartic patches for hp FE simulations, 13th International Meshing Roundtable, 2004"
+    }
+
+    fn model(&self) -> &'static ModelKind {
+        model::kind()
+    }
+
+    fn settings(&self) -> &'static [Field] {
+        settings::FIELDS
+    }
+
+    fn check(&self, settings: &Value) -> Vec<(String, String)> {
+        settings::check(settings)
+    }
+
+    fn canonical(&self, settings: Value) -> Value {
+        match Settings::resolve(&settings) {
+            Ok(resolved) => resolved.canonical(),
+            // Left as it is: running it will say what is wrong.
+            Err(_) => settings,
+        }
+    }
+
+    fn metrics(&self) -> &'static [Metric] {
+        metrics::ALL
+    }
+
+    fn counters(&self) -> &'static [(&'static str, &'static str)] {
+        COUNTERS
+    }
+
+    fn run(&self, inputs: Inputs<'_>, observer: &mut dyn Observer) -> Result<Outcome, Failure> {
+        let settings = Settings::resolve(inputs.settings)?;
+        observer.phase("prepare");
+        let problem = Problem::new(&inputs.model, &settings)?;
+        run(&problem, &settings, observer)
+    }
+}
+
+/// Names and meanings of the counters.
+pub const COUNTERS: &[(&str, &str)] = &[
+    (
+        "iterations",
+        "Newton steps on the tangents towards the enclosure condition",
+    ),
+    ("factorizations", "factorizations of their system"),
+];
+
+/// The patches of a problem, their network and what was found on the way.
+pub struct Built {
+    pub network: Network,
+    pub patches: Vec<patch::Patch>,
+    pub metrics: outcome::Metrics,
+    pub counters: BTreeMap<String, u64>,
+    pub notices: Vec<String>,
+    /// Whether everything came out as it should, and a sentence.
+    pub stop: String,
+    pub reason: String,
+}
+
+/// Violations of the enclosure condition above this show in the patches.
+const ENCLOSED: f64 = 1e-10;
+
+/// Builds the patches of a problem.
+///
+/// # Errors
+/// `invalid-input` for normals that do not fit the mesh.
+pub fn build(problem: &Problem, settings: &Settings, observer: &mut dyn Observer) -> Result<Built, Failure> {
+    observer.phase("curves");
+    let mut metrics: outcome::Metrics = metrics::ALL
+        .iter()
+        .map(|metric| (metric.name.to_string(), f64::NAN))
+        .collect();
+    let mut set = |name: &str, value: f64| {
+        metrics.insert(name.to_string(), value);
+    };
+    let mut notices = problem.notices.clone();
+    let (mut network, found) =
+        Network::natural(&problem.mesh, problem.connectivity.clone(), &problem.normals).map_err(problem::invalid)?;
+    notices.extend(found);
+    let mut counters: BTreeMap<String, u64> = COUNTERS.iter().map(|(name, _)| (name.to_string(), 0)).collect();
+    let (mut stop, mut reason) = ("converged".to_string(), "the patches are built".to_string());
+    count(&network, &mut set);
+    let violation = |network: &Network| {
+        let values = enclosure::violations(network);
+        values.into_iter().fold(0.0, |worst: f64, value| worst.max(value.abs()))
+    };
+    set("natural_energy", network.bending_energy());
+    set("enclosure_natural", violation(&network));
+    let mut tangent_change = 0.0;
+    if settings.geometry == Geometry::G1 && settings.tangents == Tangents::Enclosing {
+        let enclosed = enclosure::enclose(&mut network, observer).map_err(problem::invalid)?;
+        counters.insert("iterations".to_string(), enclosed.iterations);
+        counters.insert("factorizations".to_string(), enclosed.factorizations);
+        tangent_change = enclosed.largest_change;
+        if let Some(why) = observer.stop() {
+            stop = match serde_json::to_value(why) {
+                Ok(Value::String(word)) => word,
+                _ => "cancelled".to_string(),
+            };
+            reason = "stopped from outside before the tangents met the enclosure condition".to_string();
+        } else if !(enclosed.residual < ENCLOSED) {
+            stop = "stalled".to_string();
+            reason = format!(
+                "the tangents meet the enclosure condition only to {:.1e}: normals of neighbouring patches differ by about as \
+                 much; smoother normals or fewer extreme corners would help",
+                enclosed.residual
+            );
+        }
+    }
+    set("tangent_change", tangent_change);
+    set("curve_energy", network.bending_energy());
+    set("enclosure", violation(&network));
+
+    let fitted: Vec<Fitted> = match settings.geometry {
+        Geometry::Facets => problem
+            .mesh
+            .quads
+            .iter()
+            .map(|&quad| Fitted {
+                patch: patch::bilinear(problem.mesh.corners(quad)),
+                rank: 0,
+                residual: f64::NAN,
+                change: f64::NAN,
+                energy: [f64::NAN; 2],
+            })
+            .collect(),
+        Geometry::C0 => {
+            observer.phase("patches");
+            let operator = settings.operator();
+            (0..network.quads.len())
+                .into_par_iter()
+                .map(|quad| patch::continuous(&network, quad, operator))
+                .collect()
+        }
+        Geometry::G1 => {
+            observer.phase("normals");
+            let mut rank = None;
+            let slopes = match settings.edge_normals {
+                EdgeNormals::LeastSquares => {
+                    let solved = least_squares::solve(&network, settings.rank_tolerance).map_err(problem::invalid)?;
+                    rank = solved.rank;
+                    solved.slopes
+                }
+                exact => edge_normals::exact(&network, exact == EdgeNormals::Shortest).map_err(problem::invalid)?,
+            };
+            let residuals = edge_normals::residuals(&network, &slopes);
+            set("normal_residual", residuals.perpendicular);
+            set("twist_residual", residuals.twist);
+            set("normal_slope", residuals.largest);
+            set("normal_rank", rank.map_or(f64::NAN, |rank| rank as f64));
+            observer.phase("patches");
+            let (solve, reference, operator) = (settings.solve(), settings.reference(), settings.operator());
+            let fitted: Vec<Fitted> = (0..network.quads.len())
+                .into_par_iter()
+                .map(|quad| patch::fit(&network, &slopes, quad, solve, reference, operator))
+                .collect();
+            let most = |value: fn(&Fitted) -> f64| fitted.iter().map(value).fold(0.0, f64::max);
+            set("patch_residual", most(|patch| patch.residual));
+            set("patch_change", most(|patch| patch.change));
+            set("patch_rank_max", most(|patch| patch.rank as f64));
+            let least = fitted.iter().map(|patch| patch.rank).min().unwrap_or(0);
+            set("patch_rank_min", least as f64);
+            fitted
+        }
+    };
+    set("node_energy_before", fitted.iter().map(|patch| patch.energy[0]).sum());
+    set("node_energy", fitted.iter().map(|patch| patch.energy[1]).sum());
+    Ok(Built {
+        network,
+        patches: fitted.into_iter().map(|fitted| fitted.patch).collect(),
+        metrics,
+        counters,
+        notices,
+        stop,
+        reason,
+    })
+}
+
+/// Counts of the mesh, and how well its curves and chords fit the tangent planes.
+fn count(network: &Network, set: &mut dyn FnMut(&str, f64)) {
+    let connectivity = &network.connectivity;
+    let valences = connectivity.valences();
+    let present = |&valence: &usize| valences[valence] > 0;
+    set("quads", network.quads.len() as f64);
+    set("vertices", network.points.len() as f64);
+    set("edges", connectivity.edges.len() as f64);
+    set("boundary_edges", connectivity.boundary_edges() as f64);
+    set("even_vertices", network.even_vertices() as f64);
+    set("valence_min", (0..valences.len()).find(present).unwrap_or(0) as f64);
+    set("valence_max", (0..valences.len()).rfind(present).unwrap_or(0) as f64);
+    set(
+        "normal_rank_expected",
+        6.0 * connectivity.edges.len() as f64 - network.even_vertices() as f64,
+    );
+    let (mut tangency, mut chords) = (0.0f64, 0.0f64);
+    for (edge, ends) in connectivity.edges.iter().enumerate() {
+        let [a, b] = ends.map(|vertex| network.points[vertex as usize]);
+        let chord = subtract(b, a);
+        for (end, &vertex) in ends.iter().enumerate() {
+            let normal = network.normals[vertex as usize];
+            let tangent = network.tangents[edge][end];
+            tangency = tangency.max(dot(tangent, normal).abs() / length(tangent));
+            chords = chords.max(dot(chord, normal).abs() / length(chord));
+        }
+    }
+    set("curve_tangency", tangency);
+    set("chord_tangency", chords);
+}
+
+/// Builds, measures and tessellates the surface of a problem.
+pub fn run(problem: &Problem, settings: &Settings, observer: &mut dyn Observer) -> Result<Outcome, Failure> {
+    let mut built = build(problem, settings, observer)?;
+    observer.phase("measure");
+    let continuity = outcome::measure(problem, &built.network.normals, &built.patches, &mut built.metrics);
+    built
+        .metrics
+        .insert("edge_length".to_string(), outcome::mean_edge(problem));
+    let mesh = outcome::tessellate(
+        &built.patches,
+        &problem.connectivity,
+        &problem.mesh.quads,
+        &continuity,
+        outcome::pieces(settings, built.patches.len()),
+        settings.stripes,
+    );
+    Ok(Outcome {
+        stop: built.stop,
+        reason: built.reason,
+        metrics: built.metrics,
+        traces: BTreeMap::new(),
+        counters: built.counters,
+        notices: built.notices,
+        mesh: Some(mesh),
+    })
+}

@@ -1,0 +1,324 @@
+//! The settings of a G1 surface: their declaration as data, and the typed form that the computation reads.
+
+use super::patch::{Operator, Reference, Solve};
+use crate::method::Failure;
+use crate::method::setting::{Default, Field, Kind};
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
+
+/// Everything that `[settings]` may hold.
+pub static FIELDS: &[Field] = &[
+    Field {
+        name: "preset",
+        kind: Kind::Choice(&[
+            (
+                "best",
+                "tangents that meet the enclosure condition, exact normals and patches",
+            ),
+            (
+                "paper",
+                "natural cubics, least squares for the normals, 24 equations a patch, operator as printed",
+            ),
+        ]),
+        default: Default::Text("best"),
+        doc: "Chooses every setting that the file leaves open. A setting in the file wins over the preset.",
+    },
+    Field {
+        name: "geometry",
+        kind: Kind::Choice(&[
+            ("g1", "biquartic patches with common tangent planes"),
+            (
+                "c0",
+                "bicubic patches over the same curves, neighbours with different tangent planes",
+            ),
+            ("facets", "bilinear patches"),
+        ]),
+        default: Default::Text("g1"),
+        doc: "What is spanned between the vertices.",
+    },
+    Field {
+        name: "vertex_normals",
+        kind: Kind::Choice(&[
+            (
+                "auto",
+                "given ones, else those of the model's surface, else estimated ones",
+            ),
+            ("given", "those of the file or of the generator"),
+            (
+                "surface",
+                "those of the model's triangulated surface at the nearest point",
+            ),
+            (
+                "estimated",
+                "from the quadrilaterals around each vertex, weighted as by Max 1999",
+            ),
+        ]),
+        default: Default::Text("auto"),
+        doc: "Where the normals at the vertices come from.",
+    },
+    Field {
+        name: "tangents",
+        kind: Kind::Choice(&[
+            (
+                "enclosing",
+                "the nearest ones that meet the enclosure condition at vertices of even valence",
+            ),
+            ("natural", "those of the natural cubics, as in the paper"),
+        ]),
+        default: Default::Absent,
+        doc: "Slopes of the curves. Preset best: enclosing, paper: natural.",
+    },
+    Field {
+        name: "edge_normals",
+        kind: Kind::Choice(&[
+            (
+                "shortest",
+                "exact, with the least sum of squares over the whole surface",
+            ),
+            ("local", "exact, shortest at every vertex on its own"),
+            (
+                "least-squares",
+                "the paper's linear system, solved as well as it can be",
+            ),
+        ]),
+        default: Default::Absent,
+        doc: "Slopes of the normals along the curves. Preset best: shortest, paper: least-squares.",
+    },
+    Field {
+        name: "rank_tolerance",
+        kind: Kind::Number { min: 0.0, max: 0.1 },
+        default: Default::Number(1e-10),
+        doc: "Share of the largest singular value below which one counts as zero in the least squares for the normals.",
+    },
+    Field {
+        name: "patches",
+        kind: Kind::Choice(&[
+            (
+                "exact",
+                "twists fixed by the corners, then 16 equations for 20 unknowns, nearest to the reference",
+            ),
+            ("collocation", "the paper's 24 equations in the sense of least squares"),
+        ]),
+        default: Default::Absent,
+        doc: "How twists and side coefficients are found. Preset best: exact, paper: collocation.",
+    },
+    Field {
+        name: "patch_tolerance",
+        kind: Kind::Number { min: 0.0, max: 0.1 },
+        default: Default::Number(1e-10),
+        doc: "Share of the largest singular value below which one counts as zero in the 24 equations of a patch.",
+    },
+    Field {
+        name: "reference",
+        kind: Kind::Choice(&[
+            ("adini", "mixed derivatives of the bilinearly blended Coons patch"),
+            ("zero", "no twist"),
+        ]),
+        default: Default::Absent,
+        doc: "The twists to be nearest to. Preset best: adini, paper: zero.",
+    },
+    Field {
+        name: "operator",
+        kind: Kind::Choice(&[
+            ("laplacian", "X_uu + X_vv"),
+            (
+                "printed",
+                "X_uu + X_uv + X_vv, as printed in equation 18; it depends on how a patch is numbered",
+            ),
+        ]),
+        default: Default::Absent,
+        doc: "The operator whose square is least over the middle node. Preset best: laplacian, paper: printed.",
+    },
+    Field {
+        name: "tessellation",
+        kind: Kind::Integer { min: 1, max: 64 },
+        default: Default::Absent,
+        doc: "Pieces along a side of a patch in the result's mesh; absent: 12 for small surfaces, fewer for large ones.",
+    },
+    Field {
+        name: "stripes",
+        kind: Kind::Number { min: 1.0, max: 200.0 },
+        default: Default::Number(12.0),
+        doc: "Isophote stripes between a normal towards the light and one away from it.",
+    },
+];
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Geometry {
+    G1,
+    C0,
+    Facets,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum VertexNormals {
+    Auto,
+    Given,
+    Surface,
+    Estimated,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Tangents {
+    Enclosing,
+    Natural,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum EdgeNormals {
+    Shortest,
+    Local,
+    LeastSquares,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Patches {
+    Exact,
+    Collocation,
+}
+
+/// The settings with nothing left open.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Settings {
+    pub geometry: Geometry,
+    pub vertex_normals: VertexNormals,
+    pub tangents: Tangents,
+    pub edge_normals: EdgeNormals,
+    pub rank_tolerance: f64,
+    pub patches: Patches,
+    pub patch_tolerance: f64,
+    pub reference: String,
+    pub operator: String,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tessellation: Option<u64>,
+    pub stripes: f64,
+}
+
+/// What the presets choose: field, best, paper.
+const PRESETS: &[(&str, &str, &str)] = &[
+    ("tangents", "enclosing", "natural"),
+    ("edge_normals", "shortest", "least-squares"),
+    ("patches", "exact", "collocation"),
+    ("reference", "adini", "zero"),
+    ("operator", "laplacian", "printed"),
+];
+
+impl Settings {
+    /// Reads validated settings, full or canonical. Fields that are absent take the preset's or the declared value.
+    ///
+    /// # Errors
+    /// A value that the declaration does not allow, which validation would have found.
+    pub fn resolve(settings: &Value) -> Result<Settings, Failure> {
+        let mut table = fill(FIELDS, settings);
+        let paper = table.remove("preset").is_some_and(|preset| preset == "paper");
+        for (name, best, literal) in PRESETS {
+            let chosen = if paper { *literal } else { *best };
+            table.entry(*name).or_insert_with(|| Value::from(chosen));
+        }
+        serde_json::from_value(Value::Object(table)).map_err(|error| Failure {
+            kind: "invalid-input".to_string(),
+            reason: format!("settings of g1-surface: {error}"),
+        })
+    }
+
+    pub fn solve(&self) -> Solve {
+        match self.patches {
+            Patches::Exact => Solve::Exact,
+            Patches::Collocation => Solve::Collocation {
+                tolerance: self.patch_tolerance,
+            },
+        }
+    }
+
+    pub fn reference(&self) -> Reference {
+        if self.reference == "zero" {
+            Reference::Zero
+        } else {
+            Reference::Adini
+        }
+    }
+
+    pub fn operator(&self) -> Operator {
+        if self.operator == "printed" {
+            Operator::Printed
+        } else {
+            Operator::Laplacian
+        }
+    }
+
+    /// The settings as a table without those that cannot change the result.
+    pub fn canonical(&self) -> Value {
+        let Ok(Value::Object(mut table)) = serde_json::to_value(self) else {
+            return Value::Null;
+        };
+        let mut drop = |names: &[&str]| {
+            for name in names {
+                table.remove(*name);
+            }
+        };
+        if self.geometry != Geometry::G1 {
+            drop(&[
+                "tangents",
+                "edge_normals",
+                "rank_tolerance",
+                "patches",
+                "patch_tolerance",
+                "reference",
+            ]);
+        }
+        if self.geometry == Geometry::Facets {
+            drop(&["operator"]);
+        }
+        if self.patches == Patches::Exact {
+            drop(&["patch_tolerance"]);
+        }
+        Value::Object(table)
+    }
+}
+
+/// The given table with declared defaults where it is silent.
+fn fill(fields: &[Field], given: &Value) -> Map<String, Value> {
+    let mut table = Map::new();
+    for field in fields {
+        let value = match (&field.kind, given.get(field.name)) {
+            (Kind::Table(inner), given) => Some(Value::Object(fill(inner, given.unwrap_or(&Value::Null)))),
+            (_, Some(value)) => Some(value.clone()),
+            (_, None) => match &field.default {
+                Default::Boolean(value) => Some(Value::from(*value)),
+                Default::Integer(value) => Some(Value::from(*value)),
+                Default::Number(value) => Some(Value::from(*value)),
+                Default::Text(value) => Some(Value::from(*value)),
+                Default::Required | Default::Absent | Default::Fields => None,
+            },
+        };
+        if let Some(value) = value {
+            table.insert(field.name.to_string(), value);
+        }
+    }
+    table
+}
+
+/// Checks that go across fields: path of the offending field and message.
+pub fn check(settings: &Value) -> Vec<(String, String)> {
+    let Ok(settings) = Settings::resolve(settings) else {
+        return Vec::new();
+    };
+    let mut errors = Vec::new();
+    if settings.geometry == Geometry::G1
+        && settings.tangents == Tangents::Natural
+        && settings.edge_normals != EdgeNormals::LeastSquares
+    {
+        errors.push((
+            "edge_normals".to_string(),
+            "exact normals need tangents that meet the enclosure condition; use tangents = \"enclosing\" or \
+             edge_normals = \"least-squares\""
+                .to_string(),
+        ));
+    }
+    errors
+}

@@ -219,7 +219,7 @@ pub fn enclose(network: &mut Network, observer: &mut dyn Observer) -> Result<Enc
 
 impl Network {
     /// Whether no corner has turned over and no tangent has lost most of its length since these tangents.
-    fn keeps_sides(&self, before: &[[[f64; 3]; 2]]) -> bool {
+    pub(super) fn keeps_sides(&self, before: &[[[f64; 3]; 2]]) -> bool {
         let turned = |edge: usize| {
             (0..2).any(|end| {
                 let (old, new) = (before[edge][end], self.tangents[edge][end]);

@@ -10,6 +10,7 @@
 //! exactly; the same input gives the same bits with any number of threads. Not guaranteed: that the surface is free of
 //! folds or does not meet itself.
 
+pub mod balance;
 pub mod continuity;
 pub mod edge_normals;
 pub mod enclosure;
@@ -117,8 +118,8 @@ pub struct Built {
     pub reason: String,
 }
 
-/// Violations of the enclosure condition above this show in the patches.
-const ENCLOSED: f64 = 1e-10;
+/// Violations of the conditions above this show in the patches.
+const MET: f64 = 1e-10;
 
 /// Builds the patches of a problem.
 ///
@@ -147,23 +148,33 @@ pub fn build(problem: &Problem, settings: &Settings, observer: &mut dyn Observer
     set("natural_energy", network.bending_energy());
     set("enclosure_natural", violation(&network));
     let mut tangent_change = 0.0;
-    if settings.geometry == Geometry::G1 && settings.tangents == Tangents::Enclosing {
-        let enclosed = enclosure::enclose(&mut network, observer).map_err(problem::invalid)?;
-        counters.insert("iterations".to_string(), enclosed.iterations);
-        counters.insert("factorizations".to_string(), enclosed.factorizations);
-        tangent_change = enclosed.largest_change;
+    let mut balanced = None;
+    if settings.geometry == Geometry::G1 && settings.tangents != Tangents::Natural {
+        let (iterations, factorizations, residual);
+        if settings.tangents == Tangents::Balanced {
+            let found =
+                balance::balance(&mut network, settings.tangent_stiffness, observer).map_err(problem::invalid)?;
+            (iterations, factorizations, residual) = (found.iterations, found.factorizations, found.residual);
+            tangent_change = found.largest_change;
+            balanced = Some(found.slopes);
+        } else {
+            let found = enclosure::enclose(&mut network, observer).map_err(problem::invalid)?;
+            (iterations, factorizations, residual) = (found.iterations, found.factorizations, found.residual);
+            tangent_change = found.largest_change;
+        }
+        counters.insert("iterations".to_string(), iterations);
+        counters.insert("factorizations".to_string(), factorizations);
         if let Some(why) = observer.stop() {
             stop = match serde_json::to_value(why) {
                 Ok(Value::String(word)) => word,
                 _ => "cancelled".to_string(),
             };
-            reason = "stopped from outside before the tangents met the enclosure condition".to_string();
-        } else if !(enclosed.residual < ENCLOSED) {
+            reason = "stopped from outside before tangents and normals met their conditions".to_string();
+        } else if !(residual < MET) {
             stop = "stalled".to_string();
             reason = format!(
-                "the tangents meet the enclosure condition only to {:.1e}: normals of neighbouring patches differ by about as \
-                 much; smoother normals or fewer extreme corners would help",
-                enclosed.residual
+                "tangents and normals meet their conditions only to {residual:.1e}: normals of neighbouring patches differ by \
+                 about as much; smoother normals or fewer extreme corners would help"
             );
         }
     }
@@ -196,6 +207,7 @@ pub fn build(problem: &Problem, settings: &Settings, observer: &mut dyn Observer
             observer.phase("normals");
             let mut rank = None;
             let slopes = match settings.edge_normals {
+                _ if balanced.is_some() => balanced.take().unwrap_or_default(),
                 EdgeNormals::LeastSquares => {
                     let solved = least_squares::solve(&network, settings.rank_tolerance).map_err(problem::invalid)?;
                     rank = solved.rank;

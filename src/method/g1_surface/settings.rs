@@ -60,13 +60,23 @@ pub static FIELDS: &[Field] = &[
         name: "tangents",
         kind: Kind::Choice(&[
             (
+                "balanced",
+                "found together with the normals' slopes, so that neither goes far",
+            ),
+            (
                 "enclosing",
                 "the nearest ones that meet the enclosure condition at vertices of even valence",
             ),
             ("natural", "those of the natural cubics, as in the paper"),
         ]),
         default: Default::Absent,
-        doc: "Slopes of the curves. Preset best: enclosing, paper: natural.",
+        doc: "Slopes of the curves. Preset best: balanced, paper: natural.",
+    },
+    Field {
+        name: "tangent_stiffness",
+        kind: Kind::Number { min: 1e-6, max: 1e6 },
+        default: Default::Number(1.0),
+        doc: "Weight of squared relative changes of tangents against squared slopes of normals, for balanced tangents.",
     },
     Field {
         name: "edge_normals",
@@ -82,7 +92,7 @@ pub static FIELDS: &[Field] = &[
             ),
         ]),
         default: Default::Absent,
-        doc: "Slopes of the normals along the curves. Preset best: shortest, paper: least-squares.",
+        doc: "Slopes of the normals along the curves; of no effect with balanced tangents. Preset best: shortest, paper: least-squares.",
     },
     Field {
         name: "rank_tolerance",
@@ -163,6 +173,7 @@ pub enum VertexNormals {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Tangents {
+    Balanced,
     Enclosing,
     Natural,
 }
@@ -188,6 +199,7 @@ pub struct Settings {
     pub geometry: Geometry,
     pub vertex_normals: VertexNormals,
     pub tangents: Tangents,
+    pub tangent_stiffness: f64,
     pub edge_normals: EdgeNormals,
     pub rank_tolerance: f64,
     pub patches: Patches,
@@ -201,7 +213,7 @@ pub struct Settings {
 
 /// What the presets choose: field, best, paper.
 const PRESETS: &[(&str, &str, &str)] = &[
-    ("tangents", "enclosing", "natural"),
+    ("tangents", "balanced", "natural"),
     ("edge_normals", "shortest", "least-squares"),
     ("patches", "exact", "collocation"),
     ("reference", "adini", "zero"),
@@ -264,6 +276,7 @@ impl Settings {
         if self.geometry != Geometry::G1 {
             drop(&[
                 "tangents",
+                "tangent_stiffness",
                 "edge_normals",
                 "rank_tolerance",
                 "patches",
@@ -273,6 +286,11 @@ impl Settings {
         }
         if self.geometry == Geometry::Facets {
             drop(&["operator"]);
+        }
+        if self.tangents == Tangents::Balanced {
+            drop(&["edge_normals", "rank_tolerance"]);
+        } else {
+            drop(&["tangent_stiffness"]);
         }
         if self.patches == Patches::Exact {
             drop(&["patch_tolerance"]);

@@ -65,6 +65,16 @@ struct State<'a> {
     sizes: Vec<[f64; 3]>,
     /// Square root of the tangents' weight.
     stiffness: f64,
+    /// Edges whose unknowns may change.
+    active: Vec<bool>,
+}
+
+/// Slopes to start from, and the edges whose unknowns may change; the others stay as they are.
+pub struct Start<'a> {
+    pub slopes: &'a Slopes,
+    pub active: Vec<bool>,
+    /// Tangents of the natural cubics, from which the changes count.
+    pub natural: Vec<[[f64; 3]; 2]>,
 }
 
 impl State<'_> {
@@ -211,6 +221,9 @@ impl State<'_> {
         };
         let mut edges = vec![blank; self.free.len()];
         edges.par_iter_mut().enumerate().for_each(|(index, edge)| {
+            if !self.active[index] {
+                return;
+            }
             edge.own = self.own(index);
             let own = self.own_rows(index);
             edge.rows[4] = own[0];
@@ -222,6 +235,9 @@ impl State<'_> {
             let normal = self.network.normals[vertex];
             for (index, &corner) in self.network.connectivity.stars.row(vertex).iter().enumerate() {
                 let (a, b) = (spokes[index], spokes[(index + 1) % spokes.len()]);
+                if !self.active[a.edge as usize] && !self.active[b.edge as usize] {
+                    continue;
+                }
                 let scale = self.scale(&a, &b);
                 let area = dot(normal, cross(a.tangent, b.tangent));
                 let cotangent = dot(a.tangent, b.tangent) / area;
@@ -239,6 +255,9 @@ impl State<'_> {
                     let direction = if spoke.end == 0 { scale } else { -scale };
                     let near = times(in_plane(near, normal), direction);
                     let far = times(in_plane(far, self.network.normals[other]), -direction);
+                    if !self.active[spoke.edge as usize] {
+                        continue;
+                    }
                     let edge = &mut edges[spoke.edge as usize];
                     let slot = 2 * spoke.end + place;
                     edge.corners[slot] = corner;
@@ -293,11 +312,17 @@ const MOST_ITERATIONS: u64 = 30;
 /// Violations below this are rounding.
 const ROUNDING: f64 = 4e-15;
 
-/// Moves the tangents and finds the slopes of the normals. `stiffness` is the weight `w` of the tangents' changes.
+/// Moves the tangents and finds the slopes of the normals. `stiffness` is the weight `w` of the tangents' changes. Without a
+/// start, everything is free and begins with the network's tangents, taken as the natural ones.
 ///
 /// # Errors
 /// When the mesh is too large for the sparse factorization, or the system breaks down.
-pub fn balance(network: &mut Network, stiffness: f64, observer: &mut dyn Observer) -> Result<Balanced, String> {
+pub fn balance(
+    network: &mut Network,
+    stiffness: f64,
+    start: Option<Start<'_>>,
+    observer: &mut dyn Observer,
+) -> Result<Balanced, String> {
     let quads = network.quads.len();
     // A place for every corner, near its vertex, and four for the corners that boundary edges lack.
     let mut places = vec![[0.0; 3]; 4 * quads + 4];
@@ -310,7 +335,22 @@ pub fn balance(network: &mut Network, stiffness: f64, observer: &mut dyn Observe
             });
         }
     }
-    let natural = network.tangents.clone();
+    let count = network.tangents.len();
+    let mut numbers = vec![Free::default(); count];
+    let (natural, active) = match start {
+        None => (network.tangents.clone(), vec![true; count]),
+        Some(start) => {
+            for (edge, numbers) in numbers.iter_mut().enumerate() {
+                for end in 0..2 {
+                    let normal = network.normals[network.connectivity.edges[edge][end] as usize];
+                    let (slope, tangent) = (start.slopes[edge][end], network.tangents[edge][end]);
+                    numbers.s[end] = dot(slope, cross(normal, tangent)) / dot(tangent, tangent);
+                    numbers.v[end] = dot(slope, normal);
+                }
+            }
+            (start.natural, start.active)
+        }
+    };
     let sizes = natural
         .iter()
         .zip(&network.connectivity.edges)
@@ -320,12 +360,14 @@ pub fn balance(network: &mut Network, stiffness: f64, observer: &mut dyn Observe
         })
         .collect();
     let mut state = State {
-        free: vec![Free::default(); natural.len()],
+        free: numbers,
+        active,
         natural,
         network,
         sizes,
         stiffness: stiffness.sqrt(),
     };
+    let state_active = state.active.clone();
     let mut edges = state.linearize();
     let cells: Vec<[u32; 4]> = edges
         .iter()
@@ -339,8 +381,14 @@ pub fn balance(network: &mut Network, stiffness: f64, observer: &mut dyn Observe
             })
         })
         .collect();
-    let mut free = vec![true; places.len()];
-    free[4 * quads..].fill(false);
+    let mut free = vec![false; places.len()];
+    for &corner in edges
+        .iter()
+        .flat_map(|edge| &edge.corners)
+        .filter(|&&corner| corner != NONE)
+    {
+        free[corner as usize] = true;
+    }
     let pattern = BlockPattern::<1>::new(&places, &cells, &free).map_err(|error| error.to_string())?;
     let mut parts = vec![0.0; pattern.parts_len()];
     let mut matrix = vec![0.0; pattern.values_len()];
@@ -374,7 +422,13 @@ pub fn balance(network: &mut Network, stiffness: f64, observer: &mut dyn Observe
         });
         solver.pattern().assemble(&parts, &mut matrix);
         // J y - c, or -c alone; the edges' own rows are eliminated.
-        let mut rhs: Vec<f64> = corners.iter().map(|value| -value).collect();
+        let place = solver.pattern().free_index().to_vec();
+        let mut rhs: Vec<f64> = solver
+            .pattern()
+            .vertices()
+            .iter()
+            .map(|&corner| -corners[corner as usize])
+            .collect();
         let mut own = vec![[0.0; 2]; edges.len()];
         for (index, edge) in edges.iter().enumerate() {
             let y = if balancing {
@@ -387,7 +441,7 @@ pub fn balance(network: &mut Network, stiffness: f64, observer: &mut dyn Observe
             let weights: [f64; 2] =
                 std::array::from_fn(|row| small[row][0] * own[index][0] + small[row][1] * own[index][1]);
             for slot in (0..4).filter(|&slot| edge.corners[slot] != NONE) {
-                rhs[edge.corners[slot] as usize] += inner(&edge.rows[slot], &y)
+                rhs[place[edge.corners[slot] as usize] as usize] += inner(&edge.rows[slot], &y)
                     - inner(&edge.rows[slot], &edge.rows[4]) * weights[0]
                     - inner(&edge.rows[slot], &edge.rows[5]) * weights[1];
             }
@@ -407,8 +461,10 @@ pub fn balance(network: &mut Network, stiffness: f64, observer: &mut dyn Observe
             .par_iter()
             .enumerate()
             .map(|(index, edge)| {
-                let multipliers: [f64; 4] =
-                    std::array::from_fn(|slot| rhs.get(edge.corners[slot] as usize).copied().unwrap_or(0.0));
+                let multipliers: [f64; 4] = std::array::from_fn(|slot| {
+                    let place = place.get(edge.corners[slot] as usize);
+                    place.and_then(|&place| rhs.get(place as usize)).copied().unwrap_or(0.0)
+                });
                 let mut rest = own[index];
                 for row in 0..2 {
                     for slot in 0..4 {
@@ -435,6 +491,7 @@ pub fn balance(network: &mut Network, stiffness: f64, observer: &mut dyn Observe
         let old = state.network.tangents.clone();
         let mut step = 1.0;
         let mut accepted = false;
+        let mut ended = false;
         while step > 1e-4 {
             for edge in 0..edges.len() {
                 let y =
@@ -443,6 +500,8 @@ pub fn balance(network: &mut Network, stiffness: f64, observer: &mut dyn Observe
             }
             let (tried, tried_worst) = state.violation();
             if state.network.keeps_sides(&old) && (balancing || tried < norm) {
+                // Near rounding the violation no longer falls by much.
+                ended = !balancing && tried_worst < 1e-12 && tried > 0.5 * norm;
                 (norm, worst) = (tried, tried_worst);
                 accepted = true;
                 break;
@@ -450,7 +509,7 @@ pub fn balance(network: &mut Network, stiffness: f64, observer: &mut dyn Observe
             step /= 2.0;
         }
         if !accepted {
-            for (edge, y) in before.iter().enumerate() {
+            for (edge, y) in before.iter().enumerate().filter(|&(edge, _)| state_active[edge]) {
                 state.set(edge, y);
             }
             if !balancing {
@@ -464,6 +523,9 @@ pub fn balance(network: &mut Network, stiffness: f64, observer: &mut dyn Observe
             gradient_norm: norm,
             step,
         });
+        if ended {
+            break;
+        }
         edges = state.linearize();
     }
     found.slopes = state.slopes();

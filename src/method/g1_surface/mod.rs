@@ -104,6 +104,10 @@ pub const COUNTERS: &[(&str, &str)] = &[
         "Newton steps on the tangents towards the enclosure condition",
     ),
     ("factorizations", "factorizations of their system"),
+    (
+        "repairs",
+        "times that tangents were found anew around patches that fold",
+    ),
 ];
 
 /// The patches of a problem, their network and what was found on the way.
@@ -145,6 +149,7 @@ pub fn build(problem: &Problem, settings: &Settings, observer: &mut dyn Observer
         let values = enclosure::violations(network);
         values.into_iter().fold(0.0, |worst: f64, value| worst.max(value.abs()))
     };
+    let natural = network.tangents.clone();
     set("natural_energy", network.bending_energy());
     set("enclosure_natural", violation(&network));
     let mut tangent_change = 0.0;
@@ -153,7 +158,7 @@ pub fn build(problem: &Problem, settings: &Settings, observer: &mut dyn Observer
         let (iterations, factorizations, residual);
         if settings.tangents == Tangents::Balanced {
             let found =
-                balance::balance(&mut network, settings.tangent_stiffness, observer).map_err(problem::invalid)?;
+                balance::balance(&mut network, settings.tangent_stiffness, None, observer).map_err(problem::invalid)?;
             (iterations, factorizations, residual) = (found.iterations, found.factorizations, found.residual);
             tangent_change = found.largest_change;
             balanced = Some(found.slopes);
@@ -215,17 +220,54 @@ pub fn build(problem: &Problem, settings: &Settings, observer: &mut dyn Observer
                 }
                 exact => edge_normals::exact(&network, exact == EdgeNormals::Shortest).map_err(problem::invalid)?,
             };
+            set("normal_rank", rank.map_or(f64::NAN, |rank| rank as f64));
+            observer.phase("patches");
+            let (solve, reference, operator) = (settings.solve(), settings.reference(), settings.operator());
+            let fit = |network: &Network, slopes: &edge_normals::Slopes| -> Vec<Fitted> {
+                (0..network.quads.len())
+                    .into_par_iter()
+                    .map(|quad| patch::fit(network, slopes, quad, solve, reference, operator))
+                    .collect()
+            };
+            let mut fitted = fit(&network, &slopes);
+            let mut slopes = slopes;
+            let mut repairs = 0;
+            while settings.repair && repairs < REPAIRS && observer.stop().is_none() {
+                let folded: Vec<bool> = fitted
+                    .par_iter()
+                    .zip(&network.quads)
+                    .map(|(fitted, quad)| {
+                        outcome::folds(&fitted.patch, quad.map(|vertex| network.normals[vertex as usize]))
+                    })
+                    .collect();
+                if !folded.contains(&true) {
+                    break;
+                }
+                observer.phase("repair");
+                repairs += 1;
+                let start = balance::Start {
+                    slopes: &slopes,
+                    active: around(&network, folded, repairs),
+                    natural: natural.clone(),
+                };
+                let mut changed = network.clone();
+                let found = balance::balance(&mut changed, settings.tangent_stiffness, Some(start), observer)
+                    .map_err(problem::invalid)?;
+                if !(found.residual < MET) {
+                    continue;
+                }
+                let tried = fit(&changed, &found.slopes);
+                (network, slopes, fitted) = (changed, found.slopes, tried);
+                tangent_change = tangent_change.max(found.largest_change);
+            }
+            counters.insert("repairs".to_string(), repairs as u64);
+            set("tangent_change", tangent_change);
+            set("curve_energy", network.bending_energy());
+            set("enclosure", violation(&network));
             let residuals = edge_normals::residuals(&network, &slopes);
             set("normal_residual", residuals.perpendicular);
             set("twist_residual", residuals.twist);
             set("normal_slope", residuals.largest);
-            set("normal_rank", rank.map_or(f64::NAN, |rank| rank as f64));
-            observer.phase("patches");
-            let (solve, reference, operator) = (settings.solve(), settings.reference(), settings.operator());
-            let fitted: Vec<Fitted> = (0..network.quads.len())
-                .into_par_iter()
-                .map(|quad| patch::fit(&network, &slopes, quad, solve, reference, operator))
-                .collect();
             let most = |value: fn(&Fitted) -> f64| fitted.iter().map(value).fold(0.0, f64::max);
             set("patch_residual", most(|patch| patch.residual));
             set("patch_change", most(|patch| patch.change));
@@ -246,6 +288,37 @@ pub fn build(problem: &Problem, settings: &Settings, observer: &mut dyn Observer
         stop,
         reason,
     })
+}
+
+/// Times that tangents are found anew around folds, each within a wider neighbourhood.
+const REPAIRS: usize = 4;
+
+/// The edges of the marked patches and of those within so many rings of them.
+fn around(network: &Network, mut marked: Vec<bool>, rings: usize) -> Vec<bool> {
+    for _ in 0..rings {
+        let mut at = vec![false; network.points.len()];
+        for (quad, _) in network.quads.iter().zip(&marked).filter(|(_, marked)| **marked) {
+            for &vertex in quad {
+                at[vertex as usize] = true;
+            }
+        }
+        for (quad, mark) in network.quads.iter().zip(&mut marked) {
+            *mark |= quad.iter().any(|&vertex| at[vertex as usize]);
+        }
+    }
+    let mut edges = vec![false; network.tangents.len()];
+    for (sides, _) in network
+        .connectivity
+        .quad_edges
+        .iter()
+        .zip(&marked)
+        .filter(|(_, marked)| **marked)
+    {
+        for &edge in sides {
+            edges[edge as usize] = true;
+        }
+    }
+    edges
 }
 
 /// Counts of the mesh, and how well its curves and chords fit the tangent planes.

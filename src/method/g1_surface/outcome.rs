@@ -15,6 +15,22 @@ use std::collections::BTreeMap;
 /// Metrics of the patches by name.
 pub type Metrics = BTreeMap<String, f64>;
 
+/// Whether a patch with these normals at its corners has a normal, among 9 by 9, that points against them.
+pub fn folds(patch: &Patch, corners: [[f64; 3]; 4]) -> bool {
+    let place = |index: usize| index as f64 / (SAMPLES - 1) as f64;
+    (0..SAMPLES).any(|i| {
+        let u = Place::new(place(i));
+        (0..SAMPLES).any(|j| {
+            let v = Place::new(place(j));
+            let (s, t) = (place(i), place(j));
+            let low = add(times(corners[0], 1.0 - s), times(corners[1], s));
+            let high = add(times(corners[3], 1.0 - s), times(corners[2], s));
+            let expected = add(times(low, 1.0 - t), times(high, t));
+            !(dot(surface::first_derivatives(patch, &u, &v).area_vector(), expected) > 0.0)
+        })
+    })
+}
+
 /// What one patch adds to the metrics.
 #[derive(Clone, Copy, Debug, Default)]
 struct Measured {
@@ -46,17 +62,11 @@ pub fn measure(problem: &Problem, normals: &[[f64; 3]], patches: &[Patch], metri
                     found.curvature += area * (sum * sum - 2.0 * product);
                 }
             }
-            let corners = quad.map(|vertex| normals[vertex as usize]);
-            for (i, u) in places.iter().enumerate() {
-                for (j, v) in places.iter().enumerate() {
-                    let jet = surface::first_derivatives(patch, u, v);
-                    let (s, t) = (i as f64 / (SAMPLES - 1) as f64, j as f64 / (SAMPLES - 1) as f64);
-                    let low = add(times(corners[0], 1.0 - s), times(corners[1], s));
-                    let high = add(times(corners[3], 1.0 - s), times(corners[2], s));
-                    let expected = add(times(low, 1.0 - t), times(high, t));
-                    found.folded |= !(dot(jet.area_vector(), expected) > 0.0);
-                    if let Some(truth) = &problem.truth {
-                        let distance = truth.distance(jet.position);
+            found.folded = folds(patch, quad.map(|vertex| normals[vertex as usize]));
+            if let Some(truth) = &problem.truth {
+                for u in &places {
+                    for v in &places {
+                        let distance = truth.distance(surface::position(patch, u, v));
                         found.distance_max = found.distance_max.max(distance);
                         found.distance_squares += distance * distance;
                     }

@@ -50,7 +50,7 @@ pub static FIELDS: &[Field] = &[
             ),
             (
                 "estimated",
-                "from the quadrilaterals around each vertex, weighted as by Max 1999",
+                "from the quadrilaterals around each vertex, weighted by their angles",
             ),
         ]),
         default: Default::Text("auto"),
@@ -70,13 +70,20 @@ pub static FIELDS: &[Field] = &[
             ("natural", "those of the natural cubics, as in the paper"),
         ]),
         default: Default::Absent,
-        doc: "Slopes of the curves. Preset best: balanced, paper: natural.",
+        doc: "Slopes of the curves. Preset best: enclosing, paper: natural.",
     },
     Field {
         name: "tangent_stiffness",
         kind: Kind::Number { min: 1e-6, max: 1e6 },
-        default: Default::Number(1.0),
-        doc: "Weight of squared relative changes of tangents against squared slopes of normals, for balanced tangents.",
+        default: Default::Number(10.0),
+        doc: "Weight of squared relative changes of tangents against squared slopes of normals, where both are found together.",
+    },
+    Field {
+        name: "repair",
+        kind: Kind::Boolean,
+        default: Default::Absent,
+        doc: "Whether tangents around patches that fold are found anew, together with the normals' slopes. Preset best: true, \
+              paper: false.",
     },
     Field {
         name: "edge_normals",
@@ -200,6 +207,7 @@ pub struct Settings {
     pub vertex_normals: VertexNormals,
     pub tangents: Tangents,
     pub tangent_stiffness: f64,
+    pub repair: bool,
     pub edge_normals: EdgeNormals,
     pub rank_tolerance: f64,
     pub patches: Patches,
@@ -213,7 +221,7 @@ pub struct Settings {
 
 /// What the presets choose: field, best, paper.
 const PRESETS: &[(&str, &str, &str)] = &[
-    ("tangents", "balanced", "natural"),
+    ("tangents", "enclosing", "natural"),
     ("edge_normals", "shortest", "least-squares"),
     ("patches", "exact", "collocation"),
     ("reference", "adini", "zero"),
@@ -232,6 +240,7 @@ impl Settings {
             let chosen = if paper { *literal } else { *best };
             table.entry(*name).or_insert_with(|| Value::from(chosen));
         }
+        table.entry("repair").or_insert(Value::from(!paper));
         serde_json::from_value(Value::Object(table)).map_err(|error| Failure {
             kind: "invalid-input".to_string(),
             reason: format!("settings of g1-surface: {error}"),
@@ -277,6 +286,7 @@ impl Settings {
             drop(&[
                 "tangents",
                 "tangent_stiffness",
+                "repair",
                 "edge_normals",
                 "rank_tolerance",
                 "patches",
@@ -289,8 +299,11 @@ impl Settings {
         }
         if self.tangents == Tangents::Balanced {
             drop(&["edge_normals", "rank_tolerance"]);
-        } else {
+        } else if !self.repair {
             drop(&["tangent_stiffness"]);
+        }
+        if self.edge_normals != EdgeNormals::LeastSquares {
+            drop(&["rank_tolerance"]);
         }
         if self.patches == Patches::Exact {
             drop(&["patch_tolerance"]);

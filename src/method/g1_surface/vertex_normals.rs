@@ -1,29 +1,38 @@
 //! Normals at the vertices of a quadrilateral surface, estimated from the quads around them.
 
 use crate::linalg::vector3::{add, cross, dot, subtract, times};
-use crate::mesh::quadrilateral::{Connectivity, QuadrilateralMesh};
+use crate::mesh::quadrilateral::{Connectivity, QuadrilateralMesh, quad_and_corner};
 
-/// A normal for every vertex: the sum over its corners of `a x b / (|a|^2 |b|^2)`, with the edges `a`, `b` of the corner; for
-/// points on a sphere it is exact. Source: Max 1999, Weights for computing vertex normals from facet normals.
+/// A normal for every vertex: the sum of the unit normals of the quads around it (those of the plane of both diagonals),
+/// weighted by their angles at the vertex. Source: Thürmer and Wüthrich 1998, Computing vertex normals from polygonal facets.
 ///
 /// # Errors
 /// Names a vertex where the sum vanishes.
 pub fn estimate(mesh: &QuadrilateralMesh, connectivity: &Connectivity) -> Result<Vec<[f64; 3]>, String> {
     let mut normals = Vec::with_capacity(mesh.points.len());
-    let mut edges: Vec<[f64; 3]> = Vec::new();
+    let faces: Vec<[f64; 3]> = mesh
+        .quads
+        .iter()
+        .map(|&quad| {
+            let corners = mesh.corners(quad);
+            let face = cross(subtract(corners[2], corners[0]), subtract(corners[3], corners[1]));
+            times(face, 1.0 / dot(face, face).sqrt().max(f64::MIN_POSITIVE))
+        })
+        .collect();
     for (vertex, &here) in mesh.points.iter().enumerate() {
-        edges.clear();
-        edges.extend(connectivity.spokes(vertex).map(|edge| {
-            let other = connectivity.other_end(edge, vertex as u32);
-            subtract(mesh.points[other as usize], here)
-        }));
         let mut sum = [0.0; 3];
         let mut size = 0.0;
-        for corner in 0..connectivity.stars.row(vertex).len() {
-            let (a, b) = (edges[corner], edges[(corner + 1) % edges.len()]);
-            let squares = dot(a, a) * dot(b, b);
-            sum = add(sum, times(cross(a, b), 1.0 / squares));
-            size += 1.0 / squares.sqrt();
+        for &corner in connectivity.stars.row(vertex) {
+            let (quad, place) = quad_and_corner(corner);
+            let corners = mesh.corners(mesh.quads[quad]);
+            let (a, b) = (
+                subtract(corners[(place + 1) % 4], here),
+                subtract(corners[(place + 3) % 4], here),
+            );
+            let normal = cross(a, b);
+            let angle = dot(normal, normal).sqrt().atan2(dot(a, b));
+            sum = add(sum, times(faces[quad], angle));
+            size += angle;
         }
         let length = dot(sum, sum).sqrt();
         if !(length > 1e-9 * size) {

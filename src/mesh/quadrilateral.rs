@@ -10,7 +10,7 @@
 
 use super::check::{Element, FLAT, Problem, Problems, Severity, counted, elementary};
 use super::connectivity::{NONE, Rows};
-use super::format::Content;
+use super::format::{Content, Field};
 use super::{cross, dot, length, subtract};
 
 /// A surface of quadrilaterals in flat arrays.
@@ -34,11 +34,23 @@ pub enum Triangles {
     Split,
 }
 
-/// The names under which files keep normals of points.
-const NORMAL_FIELDS: [&str; 4] = ["normals", "normal", "Normals", "Normal"];
+/// The normals in the data of a file's points: a field of three components named `normals` or `normal`, in any case, or three
+/// fields `nx`, `ny`, `nz` as in PLY files.
+fn normals(content: &Content) -> Option<Vec<[f64; 3]>> {
+    let named = |name: &str, components: usize| {
+        let same = |field: &&Field| field.components == components && field.name.eq_ignore_ascii_case(name);
+        content.point_data.iter().find(same)
+    };
+    if let Some(field) = named("normals", 3).or_else(|| named("normal", 3)) {
+        return Some(field.values.as_chunks().0.to_vec());
+    }
+    let [x, y, z] = [named("nx", 1)?, named("ny", 1)?, named("nz", 1)?];
+    let columns = x.values.iter().zip(&y.values).zip(&z.values);
+    Some(columns.map(|((&x, &y), &z)| [x, y, z]).collect())
+}
 
 impl QuadrilateralMesh {
-    /// The surface in a mesh file. Normals are taken from a point field of three components named `normals` or `normal`.
+    /// The surface in a mesh file. Normals are taken from point fields `normals` or `nx`, `ny`, `nz`.
     /// Solid cells are passed over, with a notice in the second part of the result.
     ///
     /// # Errors
@@ -65,15 +77,10 @@ impl QuadrilateralMesh {
                 "there are no quadrilaterals; check that the file holds a surface of quadrilaterals".to_string(),
             );
         }
-        let normals = content
-            .point_data
-            .iter()
-            .find(|field| field.components == 3 && NORMAL_FIELDS.contains(&field.name.as_str()))
-            .map(|field| field.values.as_chunks().0.to_vec());
         let mesh = Self {
             points: content.points.clone(),
             quads: content.quads.clone(),
-            normals,
+            normals: normals(content),
         };
         if content.triangles.is_empty() {
             return Ok((mesh, notices));

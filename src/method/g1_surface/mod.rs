@@ -15,6 +15,8 @@ pub mod continuity;
 pub mod edge_normals;
 pub mod enclosure;
 pub mod hermite;
+pub mod hexahedra;
+pub mod laplace_beltrami;
 pub mod least_squares;
 pub mod metrics;
 pub mod model;
@@ -22,6 +24,7 @@ pub mod network;
 pub mod outcome;
 pub mod patch;
 pub mod problem;
+pub mod sampled;
 pub mod settings;
 pub mod surface;
 pub mod vertex_normals;
@@ -35,7 +38,7 @@ use crate::metric::Metric;
 use crate::optimize::Observer;
 use network::Network;
 use patch::Fitted;
-use problem::Problem;
+use problem::{Problem, Truth};
 use rayon::prelude::*;
 use serde_json::Value;
 use settings::{EdgeNormals, Geometry, Settings, Tangents};
@@ -279,6 +282,8 @@ pub fn build(problem: &Problem, settings: &Settings, observer: &mut dyn Observer
     };
     set("node_energy_before", fitted.iter().map(|patch| patch.energy[0]).sum());
     set("node_energy", fitted.iter().map(|patch| patch.energy[1]).sum());
+    set("node_change", fitted.iter().map(|patch| patch.energy[1] - patch.energy[0]).sum());
+    set("chord_distance", chord_distance(&network));
     Ok(Built {
         network,
         patches: fitted.into_iter().map(|fitted| fitted.patch).collect(),
@@ -288,6 +293,23 @@ pub fn build(problem: &Problem, settings: &Settings, observer: &mut dyn Observer
         stop,
         reason,
     })
+}
+
+/// The largest distance of a curve from its chord, over the length of the chord.
+fn chord_distance(network: &Network) -> f64 {
+    let places: Vec<[f64; 5]> = (0..=64).map(|index| hermite::values(f64::from(index) / 64.0)).collect();
+    let of_edge = |edge: usize| {
+        let curve = network.curve(edge);
+        let chord = subtract(curve[1], curve[0]);
+        let square = dot(chord, chord);
+        let away = places.iter().map(|place| {
+            let from_start = subtract(hermite::combine(place, &curve), curve[0]);
+            let share = (dot(from_start, chord) / square).clamp(0.0, 1.0);
+            length(subtract(from_start, chord.map(|component| share * component)))
+        });
+        away.fold(0.0, f64::max) / square.sqrt()
+    };
+    (0..network.tangents.len()).map(of_edge).fold(0.0, f64::max)
 }
 
 /// Times that tangents are found anew around folds, each within a wider neighbourhood.
@@ -360,14 +382,48 @@ pub fn run(problem: &Problem, settings: &Settings, observer: &mut dyn Observer) 
     built
         .metrics
         .insert("edge_length".to_string(), outcome::mean_edge(problem));
-    let mesh = outcome::tessellate(
+    let metrics = &mut built.metrics;
+    if settings.order > 0 {
+        observer.phase("simulate");
+        let Some(Truth::Analytic(exact)) = &problem.truth else {
+            return Err(problem::invalid(
+                "the test problem needs a surface given by a formula; use a generated mesh, or order = 0".to_string(),
+            ));
+        };
+        let (quads, connectivity) = (&problem.mesh.quads, &problem.connectivity);
+        let solved = laplace_beltrami::solve(&built.patches, quads, connectivity, exact, settings.order as usize)
+            .map_err(problem::invalid)?;
+        metrics.insert("l2_error".to_string(), solved.error);
+        metrics.insert("gradient_error".to_string(), solved.gradient_error);
+        metrics.insert("unknowns".to_string(), solved.unknowns as f64);
+    }
+    let mut solid = None;
+    if let Some(shell) = settings.shell() {
+        observer.phase("hexahedra");
+        let found = hexahedra::build(problem, &built.patches, shell, settings.layers as usize, observer)
+            .map_err(problem::invalid)?;
+        for (name, value) in [
+            ("hexahedra_count", found.cells.len() as f64),
+            ("jacobian_min", found.scaled.iter().copied().fold(f64::INFINITY, f64::min)),
+            ("jacobian_certified", found.positive as f64),
+            ("jacobian_not_positive", found.not_positive as f64),
+            ("jacobian_undecided", found.undecided as f64),
+            ("jacobian_bound", found.bound),
+            ("hexahedra_volume", found.volume),
+        ] {
+            metrics.insert(name.to_string(), value);
+        }
+        let pieces = outcome::pieces(settings, found.cells.len()).min(6);
+        solid = Some(hexahedra::tessellate(&found, pieces));
+    }
+    let mesh = solid.unwrap_or_else(|| outcome::tessellate(
         &built.patches,
         &problem.connectivity,
         &problem.mesh.quads,
         &continuity,
         outcome::pieces(settings, built.patches.len()),
         settings.stripes,
-    );
+    ));
     Ok(Outcome {
         stop: built.stop,
         reason: built.reason,

@@ -102,6 +102,7 @@ impl Truth {
     pub fn distance(&self, point: [f64; 3]) -> f64 {
         match self {
             Truth::Analytic(exact) => exact.distance(point),
+            Truth::Sampled(surface) => surface.distance(point),
         }
     }
 }

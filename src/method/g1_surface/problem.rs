@@ -1,9 +1,12 @@
 //! The problem that a model poses: a checked surface of quadrilaterals with a normal at every vertex, and the surface on
 //! which the vertices lie, where it is known.
 
+use super::model::RAYS;
+use super::sampled::Sampled;
 use super::settings::{Settings, VertexNormals};
 use super::vertex_normals;
-use crate::mesh::check::Severity;
+use crate::mesh::TriangleMesh;
+use crate::mesh::check::{self, Severity};
 use crate::mesh::format;
 use crate::mesh::generate::surface::{self, analytic::Analytic};
 use crate::mesh::quadrilateral::{self, Connectivity, QuadrilateralMesh, Triangles};
@@ -15,6 +18,7 @@ use serde_json::Value;
 #[derive(Clone, Debug)]
 pub enum Truth {
     Analytic(Analytic),
+    Sampled(Sampled),
 }
 
 /// See the module.
@@ -46,11 +50,29 @@ impl Problem {
             .parts
             .get("mesh")
             .ok_or_else(|| invalid("the model has no `mesh`; give it a file or a generator".to_string()))?;
+        let sampled = match model.parts.get("surface") {
+            Some(part) => Some(Sampled::new(read_surface(part, &mut notices)?)),
+            None => None,
+        };
         let (mut mesh, truth) = match part {
+            Part::Generated { generator, parameters } if generator == RAYS => {
+                let Some(sampled) = &sampled else {
+                    return Err(invalid(
+                        "the generator \"rays\" shoots at the model's `surface`, and the model has none; add surface = \
+                         \"FILE\" with a closed triangulated surface"
+                            .to_string(),
+                    ));
+                };
+                let number = |name: &str| parameters.get(name).and_then(Value::as_u64).unwrap_or(0) as usize;
+                let mesh = sampled
+                    .quads(number("cells"), number("smoothing"))
+                    .map_err(|reason| invalid(format!("generator \"rays\" of the mesh: {reason}")))?;
+                (mesh, None)
+            }
             Part::Generated { generator, parameters } => {
                 let generated = surface::generate_surface(generator, parameters)
                     .map_err(|reason| invalid(format!("generator \"{generator}\" of the mesh: {reason}")))?;
-                (generated.mesh, Some(Truth::Analytic(generated.exact)))
+                (generated.mesh, generated.exact.map(Truth::Analytic))
             }
             Part::File {
                 name,
@@ -69,6 +91,7 @@ impl Problem {
                 "mesh: the quadrilaterals form no oriented surface: {defects:?}"
             ))
         })?;
+        let truth = truth.or(sampled.map(Truth::Sampled));
         let given = mesh.normals.take();
         let normals = match (settings.vertex_normals, given) {
             (VertexNormals::Auto | VertexNormals::Given, Some(normals)) => normals,
@@ -78,6 +101,12 @@ impl Problem {
                      \"estimated\""
                         .to_string(),
                 ));
+            }
+            (VertexNormals::Auto, None) | (VertexNormals::Surface, _) if matches!(truth, Some(Truth::Sampled(_))) => {
+                match &truth {
+                    Some(Truth::Sampled(surface)) => mesh.points.iter().map(|&point| surface.project(point).1).collect(),
+                    _ => Vec::new(),
+                }
             }
             (VertexNormals::Surface, _) => {
                 return Err(invalid(
@@ -118,4 +147,38 @@ fn read_quads(
         *point = point.map(|coordinate| coordinate * scale);
     }
     Ok(mesh)
+}
+
+/// A triangulated surface; quads in the file are cut in two.
+fn read_surface(part: &Part, notices: &mut Vec<String>) -> Result<TriangleMesh, Failure> {
+    let Part::File {
+        name,
+        bytes,
+        parameters,
+    } = part
+    else {
+        return Err(invalid("the model's `surface` must be a file".to_string()));
+    };
+    let content = format::read(name, bytes).map_err(|error| invalid(error.to_string()))?;
+    notices.extend(content.notices.iter().map(|notice| format!("{name}: {notice}")));
+    let scale = parameters.get("scale").and_then(Value::as_f64).unwrap_or(1.0);
+    let mut cells = content.triangles;
+    cells.extend(content.quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]));
+    let surface = TriangleMesh {
+        points: content
+            .points
+            .iter()
+            .map(|point| point.map(|coordinate| coordinate * scale))
+            .collect(),
+        cells,
+    };
+    for problem in check::triangles(&surface) {
+        // Vertices without triangles and flat triangles do no harm to nearest points.
+        let harmless = matches!(problem.kind, "unreferenced-vertex" | "degenerate-cell" | "duplicate-cell");
+        if problem.severity == Severity::Error && !harmless {
+            return Err(invalid(format!("{name}: {}", problem.message)));
+        }
+        notices.push(format!("{name}: {}", problem.message));
+    }
+    Ok(surface)
 }

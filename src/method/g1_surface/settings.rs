@@ -1,5 +1,6 @@
 //! The settings of a G1 surface: their declaration as data, and the typed form that the computation reads.
 
+use super::hexahedra::Shell;
 use super::patch::{Operator, Reference, Solve};
 use crate::method::Failure;
 use crate::method::setting::{Default, Field, Kind};
@@ -158,6 +159,35 @@ pub static FIELDS: &[Field] = &[
         default: Default::Number(12.0),
         doc: "Isophote stripes between a normal towards the light and one away from it.",
     },
+    Field {
+        name: "hexahedra",
+        kind: Kind::Choice(&[
+            ("none", "the surface alone"),
+            ("inward", "curvilinear hexahedra between a sphere inside and the surface"),
+            ("outward", "curvilinear hexahedra between the surface and a sphere around it"),
+        ]),
+        default: Default::Text("none"),
+        doc: "A shell of transfinite hexahedra over the patches; its mesh takes the place of the surface in the result.",
+    },
+    Field {
+        name: "sphere_ratio",
+        kind: Kind::Number { min: 1e-3, max: 1e3 },
+        default: Default::Absent,
+        doc: "Radius of the sphere over the distance from the centre to the nearest vertex (inward, default 0.5) or the \
+              farthest (outward, default 1.5).",
+    },
+    Field {
+        name: "layers",
+        kind: Kind::Integer { min: 1, max: 64 },
+        default: Default::Integer(1),
+        doc: "Hexahedra between surface and sphere.",
+    },
+    Field {
+        name: "order",
+        kind: Kind::Integer { min: 0, max: 6 },
+        default: Default::Integer(0),
+        doc: "Polynomial order of a test problem with known solution on the surface; 0 for none. Generated meshes only.",
+    },
 ];
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -217,6 +247,11 @@ pub struct Settings {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tessellation: Option<u64>,
     pub stripes: f64,
+    pub hexahedra: String,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sphere_ratio: Option<f64>,
+    pub layers: u64,
+    pub order: u64,
 }
 
 /// What the presets choose: field, best, paper.
@@ -253,6 +288,19 @@ impl Settings {
             Patches::Collocation => Solve::Collocation {
                 tolerance: self.patch_tolerance,
             },
+        }
+    }
+
+    /// Where hexahedra are asked for.
+    pub fn shell(&self) -> Option<Shell> {
+        match self.hexahedra.as_str() {
+            "inward" => Some(Shell::Inward {
+                ratio: self.sphere_ratio.unwrap_or(0.5),
+            }),
+            "outward" => Some(Shell::Outward {
+                ratio: self.sphere_ratio.unwrap_or(1.5),
+            }),
+            _ => None,
         }
     }
 
@@ -297,6 +345,9 @@ impl Settings {
         if self.geometry == Geometry::Facets {
             drop(&["operator"]);
         }
+        if self.shell().is_none() {
+            drop(&["sphere_ratio", "layers"]);
+        }
         if self.tangents == Tangents::Balanced {
             drop(&["edge_normals", "rank_tolerance"]);
         } else if !self.repair {
@@ -340,6 +391,17 @@ pub fn check(settings: &Value) -> Vec<(String, String)> {
         return Vec::new();
     };
     let mut errors = Vec::new();
+    let wrong_side = match settings.shell() {
+        Some(Shell::Inward { ratio }) => ratio >= 1.0,
+        Some(Shell::Outward { ratio }) => ratio <= 1.0,
+        None => false,
+    };
+    if wrong_side {
+        errors.push((
+            "sphere_ratio".to_string(),
+            "a sphere inside needs a ratio below 1, one around the surface a ratio above 1".to_string(),
+        ));
+    }
     if settings.geometry == Geometry::G1
         && settings.tangents == Tangents::Natural
         && settings.edge_normals != EdgeNormals::LeastSquares

@@ -108,12 +108,17 @@ impl Analytic {
     /// `level = 0`. Far away (beyond the nearest centre of curvature) it may be another stationary point.
     pub fn closest(&self, x: [f64; 3]) -> [f64; 3] {
         let mut y = x;
+        // Along the gradient onto the surface, roughly: Newton's method then starts with a foot and a multiplier that fit.
+        let mut first = self.derivatives(y);
         for _ in 0..4 {
-            let Level { value, gradient, .. } = self.derivatives(y);
-            let square = dot(gradient, gradient);
-            y = std::array::from_fn(|axis| y[axis] - value * gradient[axis] / square);
+            let square = dot(first.gradient, first.gradient);
+            let step = first.value / square;
+            y = std::array::from_fn(|axis| y[axis] - step * first.gradient[axis]);
+            first = self.derivatives(y);
+            if step * step * square <= 1e-6 * dot(y, y) {
+                break;
+            }
         }
-        let first = self.derivatives(y);
         let mut multiplier = dot(subtract(x, y), first.gradient) / dot(first.gradient, first.gradient);
         for _ in 0..20 {
             let Level {
@@ -140,7 +145,8 @@ impl Analytic {
             }
             y = std::array::from_fn(|axis| y[axis] - step[axis]);
             multiplier -= step[3];
-            if step.fixed_rows::<3>(0).norm() <= 1e-15 * length(y) {
+            // Convergence is quadratic: the next step would be lost in rounding.
+            if step.fixed_rows::<3>(0).norm() <= 1e-9 * length(y) {
                 break;
             }
         }

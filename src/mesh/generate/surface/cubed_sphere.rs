@@ -58,9 +58,8 @@ const FACES: [[u32; 4]; 6] = [
     [1, 3, 7, 5],
 ];
 
-/// Unit vectors and quads of the subdivided cube.
-fn directions(arguments: &Arguments) -> (Vec<[f64; 3]>, Vec<[u32; 4]>) {
-    let cells = arguments.number("cells") as usize;
+/// Unit vectors and quads of the cube with `cells` by `cells` quads a face.
+pub fn directions(cells: usize) -> (Vec<[f64; 3]>, Vec<[u32; 4]>) {
     let corners: Vec<[f64; 3]> = (0..8u32)
         .map(|corner| std::array::from_fn(|axis| if corner >> axis & 1 == 1 { 1.0 } else { -1.0 }))
         .collect();
@@ -68,6 +67,13 @@ fn directions(arguments: &Arguments) -> (Vec<[f64; 3]>, Vec<[u32; 4]>) {
     for point in &mut points {
         *point = normalized(*point);
     }
+    (points, quads)
+}
+
+/// The same with the jitter of a generator's arguments.
+fn shaken(arguments: &Arguments) -> (Vec<[f64; 3]>, Vec<[u32; 4]>) {
+    let cells = arguments.number("cells") as usize;
+    let (mut points, quads) = directions(cells);
     let reach = arguments.number("jitter") * 1.5 / cells as f64;
     shake_directions(&mut points, reach, arguments.number("seed") as u64);
     (points, quads)
@@ -81,18 +87,18 @@ fn stretched(points: Vec<[f64; 3]>, axes: [f64; 3]) -> Vec<[f64; 3]> {
 }
 
 fn sphere(arguments: &Arguments) -> Result<GeneratedSurface, String> {
-    let (points, quads) = directions(arguments);
+    let (points, quads) = shaken(arguments);
     Ok(on(Analytic::Ellipsoid { axes: [1.0; 3] }, points, quads))
 }
 
 fn ellipsoid(arguments: &Arguments) -> Result<GeneratedSurface, String> {
-    let (points, quads) = directions(arguments);
+    let (points, quads) = shaken(arguments);
     let axes = arguments.axes();
     Ok(on(Analytic::Ellipsoid { axes }, stretched(points, axes), quads))
 }
 
 fn head(arguments: &Arguments) -> Result<GeneratedSurface, String> {
-    let (points, quads) = directions(arguments);
+    let (points, quads) = shaken(arguments);
     let features = arguments.number("features");
     // Face towards -y, crown towards z.
     let bump = |direction: [f64; 3], height: f64, sharpness: f64| Bump {

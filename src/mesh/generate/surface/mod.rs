@@ -5,6 +5,7 @@ pub mod cubed_sphere;
 pub mod icosahedron;
 pub mod poles;
 pub mod saddle;
+pub mod strip;
 pub mod torus;
 
 use super::{Arguments, Parameter, SplitMix};
@@ -17,8 +18,8 @@ use serde_json::Value;
 pub struct GeneratedSurface {
     /// With a unit normal for every point.
     pub mesh: QuadrilateralMesh,
-    /// The surface on which the points lie.
-    pub exact: Analytic,
+    /// The surface on which the points lie, where there is a formula for it.
+    pub exact: Option<Analytic>,
 }
 
 /// A kind of surface, as named in `generate = "torus"`.
@@ -40,6 +41,7 @@ pub fn surfaces() -> &'static [SurfaceGenerator] {
         icosahedron::GENERATOR,
         poles::GENERATOR,
         saddle::GENERATOR,
+        strip::GENERATOR,
     ];
     ALL
 }
@@ -113,7 +115,7 @@ fn on(exact: Analytic, points: Vec<[f64; 3]>, quads: Vec<[u32; 4]>) -> Generated
             quads,
             normals: Some(normals),
         },
-        exact,
+        exact: Some(exact),
     }
 }
 

@@ -90,7 +90,13 @@ fn derivative(points: &ControlPoints, axis: usize) -> Polynomial {
                 let place = 25 * i + 5 * j + k;
                 let weights = [i, j, k];
                 let weight: f64 = (0..3)
-                    .map(|d| if d == axis { BINOMIAL_3[weights[d]] } else { BINOMIAL_4[weights[d]] })
+                    .map(|d| {
+                        if d == axis {
+                            BINOMIAL_3[weights[d]]
+                        } else {
+                            BINOMIAL_4[weights[d]]
+                        }
+                    })
                     .product();
                 let (low, high) = (points[place], points[place + stride]);
                 values.push(std::array::from_fn(|c| 4.0 * weight * (high[c] - low[c])));
@@ -157,7 +163,11 @@ pub fn certify(points: &ControlPoints, most: usize) -> Verdict {
         .map(|axis| {
             let derivative = derivative(points, axis);
             // Scaled coefficients are at most 6 * 6 * 3 times the plain ones.
-            let largest = derivative.values.iter().map(|value| dot(*value, *value)).fold(0.0, f64::max);
+            let largest = derivative
+                .values
+                .iter()
+                .map(|value| dot(*value, *value))
+                .fold(0.0, f64::max);
             largest.sqrt()
         })
         .product();
@@ -255,7 +265,13 @@ pub fn position(points: &ControlPoints, at: [f64; 3]) -> [f64; 3] {
 
 fn bernstein(t: f64) -> [f64; 5] {
     let s = 1.0 - t;
-    [s * s * s * s, 4.0 * s * s * s * t, 6.0 * s * s * t * t, 4.0 * s * t * t * t, t * t * t * t]
+    [
+        s * s * s * s,
+        4.0 * s * s * s * t,
+        6.0 * s * s * t * t,
+        4.0 * s * t * t * t,
+        t * t * t * t,
+    ]
 }
 
 fn slope(t: f64) -> [f64; 5] {

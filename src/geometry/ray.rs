@@ -78,7 +78,9 @@ impl<'a> Rays<'a> {
                 .unwrap_or(0);
             let half = count / 2;
             rays.order[first..first + count].select_nth_unstable_by(half, |&a, &b| {
-                centres[a as usize][axis].total_cmp(&centres[b as usize][axis]).then(a.cmp(&b))
+                centres[a as usize][axis]
+                    .total_cmp(&centres[b as usize][axis])
+                    .then(a.cmp(&b))
             });
             let child = rays.nodes.len();
             for (first, count) in [(first, half), (first + half, count - half)] {
@@ -150,7 +152,10 @@ fn crosses(node: &Node, origin: [f64; 3], direction: [f64; 3]) -> bool {
     let (mut near, mut far) = (0.0f64, f64::INFINITY);
     for axis in 0..3 {
         let room = 1e-9 * (node.high[axis] - node.low[axis]).abs() + 1e-300;
-        let (low, high) = (node.low[axis] - room - origin[axis], node.high[axis] + room - origin[axis]);
+        let (low, high) = (
+            node.low[axis] - room - origin[axis],
+            node.high[axis] + room - origin[axis],
+        );
         if direction[axis] == 0.0 {
             if low > 0.0 || high < 0.0 {
                 return false;

@@ -258,14 +258,24 @@ fn read_normals(bytes: &[u8], vertices: usize) -> Result<Vec<Field>, Fault> {
                 for word in words {
                     let mut parts = word.split(|&byte| byte == b'/');
                     let (vertex, normal) = (parts.next().unwrap_or_default(), parts.nth(1).unwrap_or_default());
-                    let Some(vertex) = super::text::parse_integer(vertex) else { continue };
-                    let vertex = if vertex < 0 { seen.saturating_add(vertex) } else { vertex.saturating_sub(1) };
+                    let Some(vertex) = super::text::parse_integer(vertex) else {
+                        continue;
+                    };
+                    let vertex = if vertex < 0 {
+                        seen.saturating_add(vertex)
+                    } else {
+                        vertex.saturating_sub(1)
+                    };
                     if normal.is_empty() || vertex < 0 || vertex >= vertices as i64 {
                         continue;
                     }
                     let index = super::text::parse_integer(normal)
                         .ok_or_else(|| Fault::text(at, format!("{} is no number of a normal", shown(normal))))?;
-                    let index = if index < 0 { (normals.len() as i64).saturating_add(index) } else { index.saturating_sub(1) };
+                    let index = if index < 0 {
+                        (normals.len() as i64).saturating_add(index)
+                    } else {
+                        index.saturating_sub(1)
+                    };
                     corners.push((vertex as usize, index, at));
                 }
             }
@@ -280,7 +290,11 @@ fn read_normals(bytes: &[u8], vertices: usize) -> Result<Vec<Field>, Fault> {
         let Some(normal) = usize::try_from(index).ok().and_then(|index| normals.get(index)) else {
             return Err(Fault::text(
                 at,
-                format!("the face names normal {}; there are {}, counted from 1", index.saturating_add(1), normals.len()),
+                format!(
+                    "the face names normal {}; there are {}, counted from 1",
+                    index.saturating_add(1),
+                    normals.len()
+                ),
             ));
         };
         for axis in 0..3 {

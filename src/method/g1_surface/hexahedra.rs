@@ -167,7 +167,17 @@ fn sphere(problem: &Problem, shell: Shell, observer: &mut dyn Observer) -> Resul
     let (mut network, _) = Network::natural(&mesh, problem.connectivity.clone(), &normals)?;
     enclosure::enclose(&mut network, observer)?;
     let slopes = edge_normals::exact(&network, true)?;
-    let fit = |quad| patch::fit(&network, &slopes, quad, Solve::Exact, Reference::Adini, Operator::Laplacian).patch;
+    let fit = |quad| {
+        patch::fit(
+            &network,
+            &slopes,
+            quad,
+            Solve::Exact,
+            Reference::Adini,
+            Operator::Laplacian,
+        )
+        .patch
+    };
     Ok((0..mesh.quads.len()).into_par_iter().map(fit).collect())
 }
 

@@ -133,7 +133,9 @@ pub fn solve(
         4 => solve_order::<25>(patches, quads, connectivity, exact, order),
         5 => solve_order::<36>(patches, quads, connectivity, exact, order),
         6 => solve_order::<49>(patches, quads, connectivity, exact, order),
-        _ => Err(format!("the order of the test problem is {order}; it must be within 1 and 6")),
+        _ => Err(format!(
+            "the order of the test problem is {order}; it must be within 1 and 6"
+        )),
     }
 }
 

@@ -276,7 +276,14 @@ pub const ALL: &[Metric] = &[
         LOWER,
         "The same for the gradients along the surface.",
     ),
-    metric("unknowns", "N", "", None, PLAIN, "Number of unknowns of the test problem."),
+    metric(
+        "unknowns",
+        "N",
+        "",
+        None,
+        PLAIN,
+        "Number of unknowns of the test problem.",
+    ),
     metric(
         "hexahedra_count",
         "N_h",

@@ -282,7 +282,10 @@ pub fn build(problem: &Problem, settings: &Settings, observer: &mut dyn Observer
     };
     set("node_energy_before", fitted.iter().map(|patch| patch.energy[0]).sum());
     set("node_energy", fitted.iter().map(|patch| patch.energy[1]).sum());
-    set("node_change", fitted.iter().map(|patch| patch.energy[1] - patch.energy[0]).sum());
+    set(
+        "node_change",
+        fitted.iter().map(|patch| patch.energy[1] - patch.energy[0]).sum(),
+    );
     set("chord_distance", chord_distance(&network));
     Ok(Built {
         network,
@@ -397,14 +400,17 @@ pub fn run(problem: &Problem, settings: &Settings, observer: &mut dyn Observer) 
         metrics.insert("gradient_error".to_string(), solved.gradient_error);
         metrics.insert("unknowns".to_string(), solved.unknowns as f64);
     }
-    let mut solid = None;
+    let mut other = (settings.result == "control-points").then(|| outcome::control_nets(&built.patches));
     if let Some(shell) = settings.shell() {
         observer.phase("hexahedra");
         let found = hexahedra::build(problem, &built.patches, shell, settings.layers as usize, observer)
             .map_err(problem::invalid)?;
         for (name, value) in [
             ("hexahedra_count", found.cells.len() as f64),
-            ("jacobian_min", found.scaled.iter().copied().fold(f64::INFINITY, f64::min)),
+            (
+                "jacobian_min",
+                found.scaled.iter().copied().fold(f64::INFINITY, f64::min),
+            ),
             ("jacobian_certified", found.positive as f64),
             ("jacobian_not_positive", found.not_positive as f64),
             ("jacobian_undecided", found.undecided as f64),
@@ -414,16 +420,18 @@ pub fn run(problem: &Problem, settings: &Settings, observer: &mut dyn Observer) 
             metrics.insert(name.to_string(), value);
         }
         let pieces = outcome::pieces(settings, found.cells.len()).min(6);
-        solid = Some(hexahedra::tessellate(&found, pieces));
+        other = other.or_else(|| Some(hexahedra::tessellate(&found, pieces)));
     }
-    let mesh = solid.unwrap_or_else(|| outcome::tessellate(
-        &built.patches,
-        &problem.connectivity,
-        &problem.mesh.quads,
-        &continuity,
-        outcome::pieces(settings, built.patches.len()),
-        settings.stripes,
-    ));
+    let mesh = other.unwrap_or_else(|| {
+        outcome::tessellate(
+            &built.patches,
+            &problem.connectivity,
+            &problem.mesh.quads,
+            &continuity,
+            outcome::pieces(settings, built.patches.len()),
+            settings.stripes,
+        )
+    });
     Ok(Outcome {
         stop: built.stop,
         reason: built.reason,

@@ -104,7 +104,9 @@ impl Problem {
             }
             (VertexNormals::Auto, None) | (VertexNormals::Surface, _) if matches!(truth, Some(Truth::Sampled(_))) => {
                 match &truth {
-                    Some(Truth::Sampled(surface)) => mesh.points.iter().map(|&point| surface.project(point).1).collect(),
+                    Some(Truth::Sampled(surface)) => {
+                        mesh.points.iter().map(|&point| surface.project(point).1).collect()
+                    }
                     _ => Vec::new(),
                 }
             }
@@ -174,7 +176,10 @@ fn read_surface(part: &Part, notices: &mut Vec<String>) -> Result<TriangleMesh, 
     };
     for problem in check::triangles(&surface) {
         // Vertices without triangles and flat triangles do no harm to nearest points.
-        let harmless = matches!(problem.kind, "unreferenced-vertex" | "degenerate-cell" | "duplicate-cell");
+        let harmless = matches!(
+            problem.kind,
+            "unreferenced-vertex" | "degenerate-cell" | "duplicate-cell"
+        );
         if problem.severity == Severity::Error && !harmless {
             return Err(invalid(format!("{name}: {}", problem.message)));
         }

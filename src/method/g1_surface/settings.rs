@@ -148,6 +148,21 @@ pub static FIELDS: &[Field] = &[
         doc: "The operator whose square is least over the middle node. Preset best: laplacian, paper: printed.",
     },
     Field {
+        name: "result",
+        kind: Kind::Choice(&[
+            (
+                "tessellation",
+                "quadrilaterals on the patches, with angles, curvatures and isophotes as fields",
+            ),
+            (
+                "control-points",
+                "the nets of 5 by 5 Bezier control points of every patch, 25 points a patch in order; no picture of the surface",
+            ),
+        ]),
+        default: Default::Text("tessellation"),
+        doc: "What the result's mesh holds.",
+    },
+    Field {
         name: "tessellation",
         kind: Kind::Integer { min: 1, max: 64 },
         default: Default::Absent,
@@ -163,8 +178,14 @@ pub static FIELDS: &[Field] = &[
         name: "hexahedra",
         kind: Kind::Choice(&[
             ("none", "the surface alone"),
-            ("inward", "curvilinear hexahedra between a sphere inside and the surface"),
-            ("outward", "curvilinear hexahedra between the surface and a sphere around it"),
+            (
+                "inward",
+                "curvilinear hexahedra between a sphere inside and the surface",
+            ),
+            (
+                "outward",
+                "curvilinear hexahedra between the surface and a sphere around it",
+            ),
         ]),
         default: Default::Text("none"),
         doc: "A shell of transfinite hexahedra over the patches; its mesh takes the place of the surface in the result.",
@@ -244,6 +265,7 @@ pub struct Settings {
     pub patch_tolerance: f64,
     pub reference: String,
     pub operator: String,
+    pub result: String,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tessellation: Option<u64>,
     pub stripes: f64,
@@ -347,6 +369,9 @@ impl Settings {
         }
         if self.shell().is_none() {
             drop(&["sphere_ratio", "layers"]);
+        }
+        if self.result == "control-points" {
+            drop(&["tessellation", "stripes"]);
         }
         if self.tangents == Tangents::Balanced {
             drop(&["edge_normals", "rank_tolerance"]);

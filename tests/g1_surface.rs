@@ -4,7 +4,6 @@ use serde_json::{Value, json};
 use vargeo::fem::bernstein_hexahedron::{self as bernstein, ControlPoints, Verdict};
 use vargeo::linalg::vector3::{dot, subtract};
 use vargeo::mesh::generate::surface::{generate_surface, surfaces};
-use vargeo::mesh::length;
 use vargeo::mesh::quadrilateral::{Connectivity, QuadrilateralMesh};
 use vargeo::method::g1_surface::network::{Network, natural};
 use vargeo::method::g1_surface::patch::{Operator, Patch, Reference, Solve, fit};
@@ -14,6 +13,10 @@ use vargeo::method::g1_surface::{
 use vargeo::method::model::{LoadedModel, Part};
 use vargeo::method::{Failure, Inputs, Method, Outcome};
 use vargeo::optimize::Silent;
+
+fn length(vector: [f64; 3]) -> f64 {
+    dot(vector, vector).sqrt()
+}
 
 fn golden() -> Value {
     serde_json::from_str(include_str!("golden/g1_surface.json")).expect("the stored file is valid JSON")

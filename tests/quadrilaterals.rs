@@ -1,12 +1,16 @@
 //! Surfaces of quadrilaterals: connectivity, orientation, checks, splits, generators.
 
 use serde_json::{Value, json};
+use vargeo::linalg::vector3::{cross, dot, subtract};
 use vargeo::mesh::check::Severity;
 use vargeo::mesh::connectivity::NONE;
 use vargeo::mesh::format;
 use vargeo::mesh::generate::surface::{generate_surface, surfaces};
 use vargeo::mesh::quadrilateral::{Connectivity, QuadrilateralMesh, Triangles, check, orient, quad_and_corner};
-use vargeo::mesh::{cross, dot, length, subtract};
+
+fn length(vector: [f64; 3]) -> f64 {
+    dot(vector, vector).sqrt()
+}
 
 fn connect(mesh: &QuadrilateralMesh) -> Connectivity {
     Connectivity::of(&mesh.quads, mesh.points.len()).expect("an oriented surface")

@@ -287,6 +287,28 @@ fn every_stop_reason_is_given() {
     }
 }
 
+/// Steps cut short to a thousandth lower the value by less than a hundredth each, far from the minimum.
+#[test]
+fn a_step_cut_short_is_no_convergence() {
+    let mut short = Function {
+        max_step: |_, _| 1e-3,
+        ..rosenbrock()
+    };
+    let newton = Newton {
+        stopping: Stopping {
+            relative_change: 0.01,
+            iterations: 20,
+            ..EXACT
+        },
+        ..Newton::default()
+    };
+    let solution = newton.minimize(&mut short, vec![-1.2, 1.0], &mut Silent);
+    assert_eq!(
+        (solution.stop, solution.counters.iterations),
+        (StopReason::StepLimit, 20)
+    );
+}
+
 #[test]
 fn line_searches_keep_their_conditions() {
     let mut function = rosenbrock();

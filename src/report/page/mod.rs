@@ -14,6 +14,7 @@ use super::plot::{Chart, svg};
 use super::rate::Fit;
 use super::row::{Row, label};
 use super::{ReportError, table};
+use crate::experiment::claims::CLAIMS;
 use crate::experiment::file::Experiment;
 use crate::experiment::job::JobPart;
 use crate::experiment::record::Status;
@@ -87,11 +88,18 @@ fn plural(count: usize, one: &str, several: &str) -> String {
     format!("{count} {}", if count == 1 { one } else { several })
 }
 
+/// The papers' claims that the experiment tests; whether they hold is for the expectations to say.
 fn claims(experiment: &Experiment) -> String {
     if experiment.claims.is_empty() {
         return String::new();
     }
-    format!("<p>Reproduces {}.</p>", escape(&experiment.claims.join(", ")))
+    let mut text = String::from("<ul class=\"claims\">");
+    for id in &experiment.claims {
+        let claim = CLAIMS.iter().find(|claim| claim.id == id);
+        let meaning = claim.map_or("", |claim| claim.text);
+        let _ = write!(text, "<li><b>{}</b> {}</li>", escape(id), escape(meaning));
+    }
+    text + "</ul>"
 }
 
 fn summary(rows: &[Row], verdicts: &[Verdict]) -> String {

@@ -1,6 +1,7 @@
 //! Two result sets side by side: each figure of each job that both have, with its difference.
 
 use super::number::round;
+use crate::experiment::record::MEASUREMENTS;
 use std::fmt::Write;
 
 /// A `jobs.csv` as read back.
@@ -24,9 +25,6 @@ const WORDS: &[&str] = &[
     "key",
     "threads",
 ];
-
-/// Columns whose differences are those of machines and moments: shown, never counted.
-const MEASUREMENTS: &[&str] = &["seconds", "cpu_seconds", "peak_memory"];
 
 impl Sheet {
     /// Reads a `jobs.csv`.
@@ -120,7 +118,8 @@ pub fn compare(left: &Sheet, right: &Sheet) -> Comparison {
             if WORDS.contains(&bare) {
                 continue;
             }
-            let measured = MEASUREMENTS.contains(&bare);
+            // Differences of machines and moments are shown, never counted.
+            let measured = MEASUREMENTS.iter().any(|measured| measured.name == bare);
             if *value == other[index] {
                 comparison.equal += usize::from(!measured);
                 continue;

@@ -149,7 +149,7 @@ fn an_axis_comes_before_a_figure_or_trace_of_its_name() {
     let names = ["dirichlet", "stretch", "lscm"].map(String::from).to_vec();
     assert_eq!(chart.x.kind, plot::axis::Kind::Category(names));
     let sheet = compare::Sheet::read(&jobs::write(&sample::experiment(), &rows).unwrap()).unwrap();
-    assert!(compare::compare(&sheet, &sheet).same());
+    assert!(compare::compare(&sheet, &sheet, 0.0, &[]).same());
 }
 
 #[test]
@@ -180,9 +180,14 @@ fn two_result_sets_side_by_side() {
     right[1].record.measurement.wall_seconds = vec![0.5];
     right[3].record.result.stop = "stalled".into();
     let sheet = |rows: &[_]| compare::Sheet::read(&jobs::write(&experiment, rows).unwrap()).unwrap();
-    let comparison = compare::compare(&sheet(&left), &sheet(&right));
+    let comparison = compare::compare(&sheet(&left), &sheet(&right), 0.0, &[]);
     assert!(!comparison.same() && comparison.results().count() == 2);
     insta::assert_snapshot!("comparison", compare::describe(&comparison, "before", "after"));
-    assert!(compare::compare(&sheet(&left), &sheet(&left)).same());
+    assert!(compare::compare(&sheet(&left), &sheet(&left), 0.0, &[]).same());
+    // 254.9 against 280 is a tenth; the word of the end has no tolerance.
+    let near = compare::compare(&sheet(&left), &sheet(&right), 0.2, &[]);
+    assert_eq!(near.results().count(), 1);
+    let chosen = compare::compare(&sheet(&left), &sheet(&right), 0.0, &["d_ma".to_string()]);
+    assert!(chosen.results().all(|difference| difference.column.starts_with("d_ma")) && chosen.results().count() == 1);
     assert!(compare::Sheet::read(b"a,b\n1,2\n").is_err());
 }

@@ -52,7 +52,7 @@ impl Method for VolumeMap {
     }
 
     fn version(&self) -> u32 {
-        2
+        3
     }
 
     fn summary(&self) -> &'static str {
@@ -85,6 +85,14 @@ impl Method for VolumeMap {
 
     fn metrics(&self) -> &'static [Metric] {
         metrics::all()
+    }
+
+    fn incomparable(&self, metric: &str) -> &'static [&'static str] {
+        match metric {
+            "energy" => &["energy", "weighting", "rescale", "model"],
+            "energy_integral" => &["energy", "rescale", "model"],
+            _ => &[],
+        }
     }
 
     fn traces(&self) -> &'static [(&'static str, &'static str)] {

@@ -153,7 +153,7 @@ pub fn build(experiment: &Experiment, table: &Table, rows: &[Row]) -> Grid {
     let mut notes = Notes::default();
     let mut body = Vec::new();
     let mut any_best = false;
-    let best = best_figures(&lines, &quantities);
+    let best = best_figures(experiment, &lines, &quantities);
     for (index, line) in lines.iter().enumerate() {
         let mut cells: Vec<Cell> = line
             .axes
@@ -211,6 +211,20 @@ fn lines<'a>(table: &Table, rows: &'a [Row]) -> Vec<Line<'a>> {
             None => lines.push(Line { axes, jobs: vec![row] }),
         }
     }
+    // Values stand in the order of the file, the first axis changing most slowly.
+    let mut values: Vec<Vec<&Value>> = vec![Vec::new(); table.rows.len()];
+    for line in &lines {
+        for (known, value) in values.iter_mut().zip(&line.axes) {
+            known.extend(value.filter(|value| !known.iter().any(|other| same(other, value))));
+        }
+    }
+    let rank = |line: &Line| -> Vec<Option<usize>> {
+        let places = line.axes.iter().zip(&values);
+        places
+            .map(|(value, known)| value.and_then(|value| known.iter().position(|other| same(other, value))))
+            .collect()
+    };
+    lines.sort_by_cached_key(rank);
     lines
 }
 
@@ -329,8 +343,9 @@ pub fn mean_and_deviation(values: &[f64]) -> (f64, f64) {
     (mean, (squares / (count - 1.0)).sqrt())
 }
 
-/// Marks the best figure of each group: the lines that differ in the last row axis only.
-fn best_figures(lines: &[Line], quantities: &[Quantity]) -> Vec<Vec<bool>> {
+/// Marks the best figure of each group, the lines that differ in the last row axis only. Figures that print alike are
+/// equally good.
+fn best_figures(experiment: &Experiment, lines: &[Line], quantities: &[Quantity]) -> Vec<Vec<bool>> {
     let mut best = vec![vec![false; quantities.len()]; lines.len()];
     // Along numbers a table is a study, not a contest.
     if lines
@@ -361,12 +376,21 @@ fn best_figures(lines: &[Line], quantities: &[Quantity]) -> Vec<Vec<bool>> {
                 .push((index, sign * mean_and_deviation(&values).0));
         }
         for group in groups.values() {
+            let apart = experiment.method.incomparable(&quantity.name);
+            let kinds = group.iter().flat_map(|&(index, _)| &lines[index].jobs);
+            let kinds: Vec<Vec<Option<&Value>>> = kinds
+                .map(|job| apart.iter().map(|axis| job.axis(axis)).collect())
+                .collect();
+            if kinds.windows(2).any(|pair| pair[0] != pair[1]) {
+                continue;
+            }
             let lowest = group.iter().map(|entry| entry.1).fold(f64::INFINITY, f64::min);
-            let winners = group.iter().filter(|entry| entry.1 == lowest).count();
+            let printed = |value: f64| super::number::round(value, quantity.digits);
+            let is_best = |value: f64| value == lowest || printed(value) == printed(lowest);
             // A column in which all are equal has no best.
-            if winners < group.len() {
-                for (index, value) in group {
-                    best[*index][column] = *value == lowest;
+            if !group.iter().all(|entry| is_best(entry.1)) {
+                for &(index, value) in group {
+                    best[index][column] = is_best(value);
                 }
             }
         }

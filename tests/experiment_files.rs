@@ -680,7 +680,7 @@ fn mistakes_of_toml_are_underlined_too() {
         ),
         (
             "method = \"tiney\"\nx = 1\n",
-            "1:10 unknown method \"tiney\" |  | did you mean \"tiny\"?\n2:1 unknown key \"x\" |  | known: title, description, method, claims, models, settings, vary, zip, exclude, limits, timing, table, plot, rate, expect",
+            "1:10 unknown method \"tiney\" |  | did you mean \"tiny\"?\n1:10 method \"tiny\" needs a model, and there is none |  | add a table [models.NAME]; `vargeo new` prints an example\n2:1 unknown key \"x\" |  | known: title, description, method, claims, models, settings, vary, zip, exclude, limits, timing, table, plot, rate, expect",
         ),
         (
             "method = \"tiny\"\n",

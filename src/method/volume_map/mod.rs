@@ -52,7 +52,7 @@ impl Method for VolumeMap {
     }
 
     fn version(&self) -> u32 {
-        3
+        4
     }
 
     fn summary(&self) -> &'static str {

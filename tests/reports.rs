@@ -52,6 +52,7 @@ fn several_jobs_in_a_row_give_mean_and_deviation() {
         title: None,
         rows: vec!["family".into(), "h".into()],
         columns: vec!["error".into()],
+        across: Vec::new(),
         condition: sample::condition(&[("family", &[json!("even")])]),
         published: None,
     };
@@ -190,4 +191,36 @@ fn two_result_sets_side_by_side() {
     let chosen = compare::compare(&sheet(&left), &sheet(&right), 0.0, &["d_ma".to_string()]);
     assert!(chosen.results().all(|difference| difference.column.starts_with("d_ma")) && chosen.results().count() == 1);
     assert!(compare::Sheet::read(b"a,b\n1,2\n").is_err());
+}
+
+#[test]
+fn columns_stand_side_by_side_for_the_values_across() {
+    let experiment = sample::experiment();
+    let table = Table {
+        rows: vec!["model".into()],
+        across: vec!["energy".into()],
+        columns: vec!["d_ma".into()],
+        published: None,
+        ..experiment.tables[0].clone()
+    };
+    let rows = sample::rows();
+    let grid = build(&experiment, &table, &rows);
+    let heads: Vec<&str> = grid.head.iter().map(|head| head.text.as_str()).collect();
+    assert_eq!(
+        heads,
+        [
+            "model",
+            "d_ma, energy dirichlet",
+            "d_ma, energy stretch",
+            "d_ma, energy lscm"
+        ]
+    );
+    let stretch = rows
+        .iter()
+        .position(|row| row.axis("energy") == Some(&"stretch".into()));
+    let ours = rows[stretch.expect("a job with stretch")].figure("d_ma");
+    match grid.body[0][2].content {
+        vargeo::report::table::Content::Figure { value, spread, .. } => assert_eq!((Some(value), spread), (ours, None)),
+        ref other => panic!("{other:?}"),
+    }
 }

@@ -198,6 +198,12 @@ pub static TABLE: &[Key] = &[
     ),
     key("columns", Holds::Columns, true, "Metrics, counters and measurements."),
     key(
+        "across",
+        Holds::AxisNames,
+        false,
+        "Axes for each of whose values every column stands once, side by side; they are no rows.",
+    ),
+    key(
         "where",
         Holds::Condition,
         false,

@@ -31,11 +31,7 @@ pub enum Domain {
 
 /// Name and geometry of every domain.
 pub const DOMAINS: &[(Domain, &str, &str)] = &[
-    (
-        Domain::Square,
-        "square",
-        "[-1, 1]^2 around [-1/2, 1/2]^2",
-    ),
+    (Domain::Square, "square", "[-1, 1]^2 around [-1/2, 1/2]^2"),
     (
         Domain::LShape,
         "l-shape",

@@ -61,7 +61,11 @@ fn disk(cells: usize) -> Planar {
         let outer = |step: usize| (starts[ring] + step % count) as u32;
         let inner = |step: usize| {
             let below = 6 * (ring - 1);
-            if below == 0 { 0 } else { (starts[ring - 1] + step % below) as u32 }
+            if below == 0 {
+                0
+            } else {
+                (starts[ring - 1] + step % below) as u32
+            }
         };
         for sector in 0..6 {
             for step in 0..ring {
@@ -145,10 +149,13 @@ fn moved(
     let mut points = Vec::with_capacity(mesh.points.len());
     for ring in 0..starts.len() - 1 {
         for point in &mesh.points[starts[ring]..starts[ring + 1]] {
+            let radius = point[0].hypot(point[1]);
+            // Points of small rings stand closer to each other than a cell.
+            let spacing = TAU * radius / (starts[ring + 1] - starts[ring]) as f64;
+            let step = step * (spacing * cells as f64).min(1.0);
             let (dx, dy) = (step * random.signed(), step * random.signed());
             points.push(if marked.contains(&ring) {
-                let radius = point[0].hypot(point[1]);
-                let turn = dx / radius;
+                let turn = if radius > 0.0 { dx / radius } else { 0.0 };
                 [
                     point[0] * turn.cos() - point[1] * turn.sin(),
                     point[0] * turn.sin() + point[1] * turn.cos(),
@@ -199,7 +206,11 @@ fn compact(mesh: TriangleMesh) -> TriangleMesh {
             points.push(point);
         }
     }
-    let cells = mesh.cells.iter().map(|cell| cell.map(|vertex| name[vertex as usize])).collect();
+    let cells = mesh
+        .cells
+        .iter()
+        .map(|cell| cell.map(|vertex| name[vertex as usize]))
+        .collect();
     TriangleMesh { points, cells }
 }
 

@@ -103,7 +103,10 @@ impl<'a> Domain<'a> {
             (Place::FirstRing, Place::SecondRing),
         ] {
             for vertex in 0..vertices as u32 {
-                let near = graph.neighbours(vertex).iter().any(|&other| places[other as usize] == from);
+                let near = graph
+                    .neighbours(vertex)
+                    .iter()
+                    .any(|&other| places[other as usize] == from);
                 if places[vertex as usize] == Place::Outside && near {
                     places[vertex as usize] = ring;
                 }
@@ -140,7 +143,10 @@ impl<'a> Domain<'a> {
         }
         if let Some((_, Some(vertex))) = fixed.iter().zip(&free).find(|(fixed, free)| !**fixed && free.is_some()) {
             let parts = if parts.count > 1 {
-                format!("the mesh has {} parts that do not hang together, and the one", parts.count)
+                format!(
+                    "the mesh has {} parts that do not hang together, and the one",
+                    parts.count
+                )
             } else {
                 "the mesh".to_string()
             };

@@ -75,13 +75,29 @@ pub struct Analysis(SymbolicCholesky<usize>);
 /// When memory runs out.
 pub fn analyse(matrix: &LowerMatrix) -> Result<Analysis, Failure> {
     let dimension = matrix.dimension();
-    let symbolic = SymbolicSparseColMatRef::new_checked(dimension, dimension, &matrix.offsets, None, &matrix.rows);
+    // The analysis reads the upper triangle by columns, which is the lower one by rows.
+    let mut offsets = vec![0usize; dimension + 1];
+    for &row in &matrix.rows {
+        offsets[row + 1] += 1;
+    }
+    for row in 0..dimension {
+        offsets[row + 1] += offsets[row];
+    }
+    let mut next = offsets.clone();
+    let mut columns = vec![0usize; matrix.rows.len()];
+    for column in 0..dimension {
+        for &row in &matrix.rows[matrix.offsets[column]..matrix.offsets[column + 1]] {
+            columns[next[row]] = column;
+            next[row] += 1;
+        }
+    }
+    let symbolic = SymbolicSparseColMatRef::new_checked(dimension, dimension, &offsets, None, &columns);
     let parameters = CholeskySymbolicParams {
         // Without supernodes there is no pivoting.
         supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
         ..Default::default()
     };
-    factorize_symbolic_cholesky(symbolic, Side::Lower, SymmetricOrdering::Identity, parameters)
+    factorize_symbolic_cholesky(symbolic, Side::Upper, SymmetricOrdering::Identity, parameters)
         .map(Analysis)
         .map_err(|_| too_large("the structure of the factor"))
 }
@@ -178,8 +194,8 @@ impl Factorization {
             values[start..start + range.len()].copy_from_slice(&matrix.values[range]);
         }
         let structure = SymbolicSparseColMatRef::new_checked(dimension, dimension, &offsets, None, &rows);
-        let symbolic =
-            factorize_symbolic_lu(structure, Default::default()).map_err(|_| too_large("the structure of the factor"))?;
+        let symbolic = factorize_symbolic_lu(structure, Default::default())
+            .map_err(|_| too_large("the structure of the factor"))?;
         let mut numeric = NumericLu::new();
         let scratch = symbolic.factorize_numeric_lu_scratch::<f64>(Par::Seq, Default::default());
         let mut memory = MemBuffer::try_new(scratch).map_err(|_| too_large("the factorization"))?;
@@ -191,7 +207,11 @@ impl Factorization {
                 MemStack::new(&mut memory),
                 Default::default(),
             )
-            .map_err(|error| singular(format!("the LU factorization broke down ({error:?}): the system is singular")))?;
+            .map_err(|error| {
+                singular(format!(
+                    "the LU factorization broke down ({error:?}): the system is singular"
+                ))
+            })?;
         Ok(Self {
             matrix: Matrix::Mixed(matrix),
             factor: Factor::Lu(Box::new(Lu { symbolic, numeric })),
@@ -304,7 +324,11 @@ impl Factorization {
                 (residual, relative) = (next, less);
             }
             // `max` would pass over not-a-number.
-            worst = if relative.is_finite() { worst.max(relative) } else { f64::NAN };
+            worst = if relative.is_finite() {
+                worst.max(relative)
+            } else {
+                f64::NAN
+            };
             if worst.is_nan() {
                 return Ok(f64::NAN);
             }
@@ -349,7 +373,11 @@ impl Factorization {
 
 fn largest(values: &[f64]) -> f64 {
     values.iter().fold(0.0, |worst: f64, value| {
-        if worst.is_nan() || value.is_nan() { f64::NAN } else { worst.max(value.abs()) }
+        if worst.is_nan() || value.is_nan() {
+            f64::NAN
+        } else {
+            worst.max(value.abs())
+        }
     })
 }
 

@@ -206,5 +206,8 @@ pub static ALL: &[Metric] = &[
 pub const COUNTERS: &[(&str, &str)] = &[
     ("factorizations", "factorizations, those that broke down included"),
     ("solutions", "right-hand sides solved for, each with refinement"),
-    ("fallbacks", "factorizations repeated by LU because the first one broke down"),
+    (
+        "fallbacks",
+        "factorizations repeated by LU because the first one broke down",
+    ),
 ];

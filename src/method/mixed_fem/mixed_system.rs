@@ -119,11 +119,7 @@ impl Numbering {
 
 /// Calls `visit(row field, column vertex, column field, coefficient)` for every coefficient in the rows of the
 /// unknowns of one vertex.
-fn coefficients(
-    discretization: &Discretization<'_>,
-    vertex: u32,
-    mut visit: impl FnMut(usize, usize, usize, f64),
-) {
+fn coefficients(discretization: &Discretization<'_>, vertex: u32, mut visit: impl FnMut(usize, usize, usize, f64)) {
     let operators = discretization.operators;
     let lumped = (discretization.mass != Mass::Full).then(|| discretization.lumped());
     let (u, v, w) = (0, 1, 2);

@@ -118,7 +118,11 @@ pub fn load(model: &LoadedModel) -> Result<Model, Failure> {
             name,
             bytes,
             parameters,
-        } => read(name, bytes, parameters.get("scale").and_then(Value::as_f64).unwrap_or(1.0))?,
+        } => read(
+            name,
+            bytes,
+            parameters.get("scale").and_then(Value::as_f64).unwrap_or(1.0),
+        )?,
         Part::Generated { generator, parameters } => generate(generator, parameters)?,
     };
     if let Some(Part::File { name, bytes, .. }) = model.parts.get("selection") {

@@ -33,7 +33,10 @@ impl Rows {
 
     fn row(&self, row: usize) -> impl Iterator<Item = (u32, f64)> {
         let range = self.offsets[row]..self.offsets[row + 1];
-        self.columns[range.clone()].iter().copied().zip(self.values[range].iter().copied())
+        self.columns[range.clone()]
+            .iter()
+            .copied()
+            .zip(self.values[range].iter().copied())
     }
 }
 

@@ -26,12 +26,7 @@ impl Derivatives {
 }
 
 /// Samples the conditions and the right-hand side of `Laplacian^order u = g`.
-pub fn sample<'a>(
-    domain: &Domain<'_>,
-    function: &Function,
-    derivatives: &'a Derivatives,
-    order: usize,
-) -> Data<'a> {
+pub fn sample<'a>(domain: &Domain<'_>, function: &Function, derivatives: &'a Derivatives, order: usize) -> Data<'a> {
     let points = &domain.mesh.points;
     let conormal = domain
         .edges
@@ -43,7 +38,12 @@ pub fn sample<'a>(
             })
         })
         .collect();
-    let at = |times: u32| points.iter().map(|&point| function.laplacian(plane(point), times)).collect();
+    let at = |times: u32| {
+        points
+            .iter()
+            .map(|&point| function.laplacian(plane(point), times))
+            .collect()
+    };
     Data {
         components: 1,
         values: points.iter().map(|&point| function.value(plane(point))).collect(),
@@ -97,7 +97,11 @@ pub fn errors(domain: &Domain<'_>, function: &Function, values: &[f64]) -> Error
     for (vertex, &place) in domain.places.iter().enumerate() {
         if matches!(place, Place::Interior | Place::Boundary) {
             let difference = (values[vertex] - function.value(plane(mesh.points[vertex]))).abs();
-            errors.max = if difference.is_nan() { f64::NAN } else { errors.max.max(difference) };
+            errors.max = if difference.is_nan() {
+                f64::NAN
+            } else {
+                errors.max.max(difference)
+            };
         }
     }
     errors

@@ -12,7 +12,10 @@ pub static FIELDS: &[Field] = &[
     Field {
         name: "equation",
         kind: Kind::Choice(&[
-            ("biharmonic", "order 2: the Laplacian energy, surfaces that join with common tangents"),
+            (
+                "biharmonic",
+                "order 2: the Laplacian energy, surfaces that join with common tangents",
+            ),
             (
                 "triharmonic",
                 "order 3: the Laplacian gradient energy, surfaces that join with common curvatures",
@@ -24,8 +27,14 @@ pub static FIELDS: &[Field] = &[
     Field {
         name: "condition",
         kind: Kind::Choice(&[
-            ("region", "fixed rings of vertices around the domain, or isolated fixed points"),
-            ("curve", "values and conormal derivatives on the curve that bounds the domain"),
+            (
+                "region",
+                "fixed rings of vertices around the domain, or isolated fixed points",
+            ),
+            (
+                "curve",
+                "values and conormal derivatives on the curve that bounds the domain",
+            ),
         ]),
         default: Default::Text("region"),
         doc: "What is prescribed, and where.",
@@ -33,10 +42,19 @@ pub static FIELDS: &[Field] = &[
     Field {
         name: "curve",
         kind: Kind::Choice(&[
-            ("stabilised", "system (15) with relaxed boundary rows: converges as h^2 on every family tried"),
-            ("first-order-ring", "the paper's: the first inner ring from the conormal derivatives"),
+            (
+                "stabilised",
+                "system (15) with relaxed boundary rows: converges as h^2 on every family tried",
+            ),
+            (
+                "first-order-ring",
+                "the paper's: the first inner ring from the conormal derivatives",
+            ),
             ("second-order-ring", "the same with second derivatives on the boundary"),
-            ("unstabilised", "system (15) as it stands, mostly singular (Proposition 2)"),
+            (
+                "unstabilised",
+                "system (15) as it stands, mostly singular (Proposition 2)",
+            ),
         ]),
         default: Default::Text("stabilised"),
         doc: "How the triharmonic equation takes curve conditions.",
@@ -50,7 +68,10 @@ pub static FIELDS: &[Field] = &[
     Field {
         name: "mass",
         kind: Kind::Choice(&[
-            ("hybrid", "lumped: Voronoi areas in triangles without an obtuse angle (Meyer et al. 2003)"),
+            (
+                "hybrid",
+                "lumped: Voronoi areas in triangles without an obtuse angle (Meyer et al. 2003)",
+            ),
             ("barycentric", "lumped: a third of every triangle"),
             ("full", "not lumped; curve conditions only"),
         ]),
@@ -60,8 +81,14 @@ pub static FIELDS: &[Field] = &[
     Field {
         name: "system",
         kind: Kind::Choice(&[
-            ("auto", "one-field where the mass is lumped and the system is not singular by design"),
-            ("one-field", "the other fields are eliminated: positive definite, fewer unknowns, less sparse"),
+            (
+                "auto",
+                "one-field where the mass is lumped and the system is not singular by design",
+            ),
+            (
+                "one-field",
+                "the other fields are eliminated: positive definite, fewer unknowns, less sparse",
+            ),
             ("mixed", "all fields at once: symmetric and indefinite"),
         ]),
         default: Default::Text("auto"),
@@ -70,10 +97,19 @@ pub static FIELDS: &[Field] = &[
     Field {
         name: "solver",
         kind: Kind::Choice(&[
-            ("auto", "cholesky for one-field systems, lblt for mixed ones and lu where that breaks down"),
+            (
+                "auto",
+                "cholesky for one-field systems, lblt for mixed ones and lu where that breaks down",
+            ),
             ("cholesky", "multifrontal, nested dissection; one-field systems only"),
-            ("lblt", "Bunch-Kaufman pivots within supernodes, nested dissection; mixed systems only"),
-            ("lu", "partial pivoting, column order by minimum degree; mixed systems only"),
+            (
+                "lblt",
+                "Bunch-Kaufman pivots within supernodes, nested dissection; mixed systems only",
+            ),
+            (
+                "lu",
+                "partial pivoting, column order by minimum degree; mixed systems only",
+            ),
         ]),
         default: Default::Text("auto"),
         doc: "The factorization.",
@@ -81,10 +117,22 @@ pub static FIELDS: &[Field] = &[
     Field {
         name: "data",
         kind: Kind::Choice(&[
-            ("auto", "function on a planar mesh without handles, position on other meshes"),
-            ("function", "a function of x and y, with its powers of the Laplacian on the right"),
-            ("position", "the coordinates of the fixed vertices: a smooth surface through them"),
-            ("displacement", "the handles' motion, added to the surface: keeps details"),
+            (
+                "auto",
+                "function on a planar mesh without handles, position on other meshes",
+            ),
+            (
+                "function",
+                "a function of x and y, with its powers of the Laplacian on the right",
+            ),
+            (
+                "position",
+                "the coordinates of the fixed vertices: a smooth surface through them",
+            ),
+            (
+                "displacement",
+                "the handles' motion, added to the surface: keeps details",
+            ),
         ]),
         default: Default::Text("auto"),
         doc: "What the unknown stands for and where its conditions come from.",
@@ -117,7 +165,10 @@ pub static FIELDS: &[Field] = &[
             },
             Field {
                 name: "scale",
-                kind: Kind::Number { min: -100.0, max: 100.0 },
+                kind: Kind::Number {
+                    min: -100.0,
+                    max: 100.0,
+                },
                 default: Default::Number(1.0),
                 doc: "Factor for the length of the conormal derivative; 1 keeps the surface's speed.",
             },
@@ -131,7 +182,10 @@ pub static FIELDS: &[Field] = &[
         kind: Kind::Table(&[
             Field {
                 name: "scale",
-                kind: Kind::Number { min: -100.0, max: 100.0 },
+                kind: Kind::Number {
+                    min: -100.0,
+                    max: 100.0,
+                },
                 default: Default::Number(1.0),
                 doc: "Factor for the curvature of the surface beyond the curve.",
             },
@@ -186,10 +240,19 @@ static HANDLE: &[Field] = &[
             ("all", "every vertex"),
             ("box", "vertices between `min` and `max`"),
             ("sphere", "vertices within `radius` of `center`"),
-            ("plane", "vertices on the side of the plane through `center` that `normal` points to"),
+            (
+                "plane",
+                "vertices on the side of the plane through `center` that `normal` points to",
+            ),
             ("nearest", "the vertex nearest to `center`"),
-            ("boundary", "vertices of the mesh's boundary and of the `rings` next to it"),
-            ("loop", "vertices of one boundary loop, `loop`, and of the `rings` next to it"),
+            (
+                "boundary",
+                "vertices of the mesh's boundary and of the `rings` next to it",
+            ),
+            (
+                "loop",
+                "vertices of one boundary loop, `loop`, and of the `rings` next to it",
+            ),
             ("file", "vertices whose number in the model's `selection` is `value`"),
         ]),
         default: Default::Required,

@@ -33,7 +33,13 @@ pub fn find(domain: &Domain<'_>) -> Singular {
     let mut matched = 0;
     let mut visited = vec![u32::MAX; vertices];
     for &vertex in &boundary {
-        let inner: Vec<u32> = domain.graph.neighbours(vertex).iter().copied().filter(|&v| free(v)).collect();
+        let inner: Vec<u32> = domain
+            .graph
+            .neighbours(vertex)
+            .iter()
+            .copied()
+            .filter(|&v| free(v))
+            .collect();
         found.rows += usize::from(!inner.is_empty());
         for &other in &inner {
             reached[other as usize] = true;

@@ -146,7 +146,11 @@ fn function_study(
         values[vertex] - function.value([point[0], point[1]])
     });
     let solution = over(&|vertex| values[vertex]);
-    let inside: Vec<f64> = domain.inside.iter().map(|&inside| f64::from(u8::from(inside))).collect();
+    let inside: Vec<f64> = domain
+        .inside
+        .iter()
+        .map(|&inside| f64::from(u8::from(inside)))
+        .collect();
     let picture = vtu::write(
         &lifted,
         Cells {
@@ -154,7 +158,11 @@ fn function_study(
             ..Cells::default()
         },
         &[("solution", 1, &values)],
-        &[("error", 1, &difference), ("solution", 1, &solution), ("domain", 1, &inside)],
+        &[
+            ("error", 1, &difference),
+            ("solution", 1, &solution),
+            ("domain", 1, &inside),
+        ],
     );
     Ok(report.outcome(picture))
 }
@@ -194,8 +202,7 @@ fn solve(
     } else {
         vec![true; domain.mesh.cells.len()]
     };
-    let operators =
-        SurfaceOperators::new(domain.mesh, &selected).map_err(|error| invalid(format!("mesh: {error}")))?;
+    let operators = SurfaceOperators::new(domain.mesh, &selected).map_err(|error| invalid(format!("mesh: {error}")))?;
     let discretization = Discretization::new(
         domain,
         &operators,
@@ -227,7 +234,10 @@ fn solve(
         let compared = other.solve(&discretization, &mut Quiet(observer))?;
         report.count("factorizations", other.factorizations);
         report.count("solutions", data.components as u64);
-        let size = solution.values.iter().fold(0.0, |size: f64, value| size.max(value.abs()));
+        let size = solution
+            .values
+            .iter()
+            .fold(0.0, |size: f64, value| size.max(value.abs()));
         let difference = solution
             .values
             .iter()
@@ -262,8 +272,14 @@ struct Report {
 impl Report {
     fn new(model: &Model, domain: &Domain<'_>) -> Self {
         let mut report = Self {
-            metrics: metrics::ALL.iter().map(|metric| (metric.name.to_string(), f64::NAN)).collect(),
-            counters: metrics::COUNTERS.iter().map(|(name, _)| (name.to_string(), 0)).collect(),
+            metrics: metrics::ALL
+                .iter()
+                .map(|metric| (metric.name.to_string(), f64::NAN))
+                .collect(),
+            counters: metrics::COUNTERS
+                .iter()
+                .map(|(name, _)| (name.to_string(), 0))
+                .collect(),
             notices: model.notices.clone(),
             reason: String::new(),
         };
@@ -332,7 +348,10 @@ impl Report {
         self.set("residual", residual);
         self.set("unknowns", system.unknowns() as f64);
         self.set("matrix_entries", system.matrix_entries() as f64);
-        self.set("factor_entries", system.factor_entries().map_or(f64::NAN, |entries| entries as f64));
+        self.set(
+            "factor_entries",
+            system.factor_entries().map_or(f64::NAN, |entries| entries as f64),
+        );
         self.count("factorizations", system.factorizations);
         self.count("fallbacks", system.fallbacks);
         if system.fallbacks > 0 {

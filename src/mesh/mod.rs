@@ -9,6 +9,7 @@ pub mod check;
 pub mod summary;
 pub mod generate;
 pub mod planar;
+pub mod band;
 pub mod target;
 pub mod format;
 

@@ -214,3 +214,39 @@ impl Random {
         (bits >> 11) as f64 * (2.0 / (1u64 << 53) as f64) - 1.0
     }
 }
+
+/// Triangulates a convex polygon, counter-clockwise, with points of a triangular grid of the given spacing within. The
+/// polygon's corners come first and stay its only boundary points.
+///
+/// # Errors
+/// When the polygon crosses itself or is too large for its spacing.
+pub fn fill_polygon(polygon: &[[f64; 2]], spacing: f64) -> Result<TriangleMesh, String> {
+    let reach = polygon.iter().map(|[x, y]| x.hypot(*y)).fold(0.0, f64::max);
+    if !(spacing > 0.0 && reach / spacing < 5000.0) {
+        return Err(format!(
+            "a patch of radius {reach:e} with edges of {spacing:e} would have too many triangles"
+        ));
+    }
+    let count = polygon.len();
+    let mut points = polygon.to_vec();
+    let rows = (reach / (spacing * 0.75f64.sqrt())).ceil() as i64;
+    for row in -rows..=rows {
+        let y = row as f64 * spacing * 0.75f64.sqrt();
+        let shift = if row.rem_euclid(2) == 0 { 0.0 } else { 0.5 };
+        let columns = (reach / spacing).ceil() as i64 + 1;
+        for column in -columns..=columns {
+            let x = (column as f64 + shift) * spacing;
+            // Clear of every side, whose triangles would be thin otherwise.
+            let clear = (0..count).all(|side| {
+                let (a, b) = (polygon[side], polygon[(side + 1) % count]);
+                let (dx, dy) = (b[0] - a[0], b[1] - a[1]);
+                dx * (y - a[1]) - dy * (x - a[0]) > 0.6 * spacing * dx.hypot(dy)
+            });
+            if clear {
+                points.push([x, y]);
+            }
+        }
+    }
+    let sides: Vec<[usize; 2]> = (0..count).map(|side| [side, (side + 1) % count]).collect();
+    delaunay::triangulate(points, &sides, None)
+}

@@ -12,15 +12,20 @@
 pub mod domain;
 pub mod factorization;
 pub mod function;
+pub mod handles;
+pub mod hole;
 pub mod metrics;
 pub mod mixed_system;
 pub mod model;
 pub mod one_field;
 pub mod planar_data;
 pub mod scheme;
+pub mod seam;
 pub mod settings;
 pub mod singular;
 pub mod study;
+pub mod surface_data;
+pub mod surface_study;
 pub mod system;
 
 use super::model::ModelKind;

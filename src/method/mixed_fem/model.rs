@@ -1,6 +1,7 @@
 //! What a model of a mixed finite element computation may be: a triangle mesh, and numbers that select vertices.
 
 use crate::mesh::TriangleMesh;
+use crate::mesh::band::{self, Joint, Section};
 use crate::mesh::format::{self, Content};
 use crate::mesh::planar::{self, DOMAINS, FAMILIES};
 use crate::method::Failure;
@@ -39,6 +40,99 @@ static FILE: &[Field] = &[Field {
     doc: "Factor for the coordinates in the file.",
 }];
 
+/// A number among a generator's parameters.
+const fn number(name: &'static str, default: f64, min: f64, max: f64, doc: &'static str) -> Field {
+    Field {
+        name,
+        kind: Kind::Number { min, max },
+        default: Default::Number(default),
+        doc,
+    }
+}
+
+/// A count among a generator's parameters.
+const fn count(name: &'static str, default: i64, min: i64, max: i64, doc: &'static str) -> Field {
+    Field {
+        name,
+        kind: Kind::Integer { min, max },
+        default: Default::Integer(default),
+        doc,
+    }
+}
+
+const SECTIONS: Kind = Kind::Choice(&[
+    ("circle", "a circle of the given radius"),
+    ("square", "a square of twice the given size"),
+]);
+
+/// Surfaces in space.
+static SURFACES: &[Generator] = &[
+    Generator {
+        name: "joint",
+        parameters: &[
+            Field {
+                name: "lower",
+                kind: SECTIONS,
+                default: Default::Text("circle"),
+                doc: "Cross-section of the lower tube.",
+            },
+            Field {
+                name: "upper",
+                kind: SECTIONS,
+                default: Default::Text("circle"),
+                doc: "Cross-section of the upper tube.",
+            },
+            number(
+                "lower_size",
+                1.0,
+                1e-6,
+                1e6,
+                "Radius or half the side of the lower tube.",
+            ),
+            number(
+                "upper_size",
+                0.5,
+                1e-6,
+                1e6,
+                "Radius or half the side of the upper tube.",
+            ),
+            number("gap", 1.0, 1e-6, 1e6, "Height of the free band between the tubes."),
+            number("height", 0.6, 1e-6, 1e6, "Height of each tube."),
+            count("around", 64, 8, 4096, "Points around."),
+        ],
+        doc: "two tubes that are kept and a free band that joins them",
+    },
+    Generator {
+        name: "strip",
+        parameters: &[
+            count("around", 64, 8, 4096, "Points around."),
+            count("waves", 3, 0, 64, "Waves of the upper curve."),
+            number(
+                "height",
+                1.5,
+                0.01,
+                100.0,
+                "Height of the upper curve over the lower one, a circle of radius 1.",
+            ),
+        ],
+        doc: "a free strip between two closed curves, over a straight tube as its domain",
+    },
+    Generator {
+        name: "cap",
+        parameters: &[
+            count("rings", 16, 2, 2048, "Rings of triangles, an even number."),
+            number(
+                "angle",
+                90.0,
+                5.0,
+                170.0,
+                "Angle from the pole to the rim, in degrees; 90 is a half sphere.",
+            ),
+        ],
+        doc: "a part of the unit sphere around its pole, with one hole",
+    },
+];
+
 static FAMILY_NAMES: LazyLock<Vec<(&'static str, &'static str)>> =
     LazyLock::new(|| FAMILIES.iter().map(|&(_, name, doc)| (name, doc)).collect());
 
@@ -75,7 +169,7 @@ static KIND: LazyLock<ModelKind> = LazyLock::new(|| {
                 file: true,
                 file_parameters: FILE,
                 generator_key: "generate",
-                generators: keep(planar.collect()),
+                generators: keep(planar.chain(SURFACES.iter().map(again)).collect()),
                 doc: "The triangle mesh: a plane domain around an inner one, or a surface in space.",
             },
             Role {
@@ -91,6 +185,14 @@ static KIND: LazyLock<ModelKind> = LazyLock::new(|| {
         ]),
     }
 });
+
+fn again(generator: &Generator) -> Generator {
+    Generator {
+        name: generator.name,
+        parameters: generator.parameters,
+        doc: generator.doc,
+    }
+}
 
 /// The declaration.
 pub fn kind() -> &'static ModelKind {
@@ -134,6 +236,59 @@ pub fn load(model: &LoadedModel) -> Result<Model, Failure> {
 fn generate(generator: &str, parameters: &Value) -> Result<Model, Failure> {
     let word = |name: &str, default: &'static str| parameters.get(name).and_then(Value::as_str).unwrap_or(default);
     let number = |name: &str, default: u64| parameters.get(name).and_then(Value::as_u64).unwrap_or(default);
+    let size = |name: &str, default: f64| parameters.get(name).and_then(Value::as_f64).unwrap_or(default);
+    let section = |name: &str| match word(name, "circle") {
+        "square" => Section::Square,
+        _ => Section::Circle,
+    };
+    match generator {
+        "joint" => {
+            let around = number("around", 64) as usize;
+            let joint = Joint {
+                lower: section("lower"),
+                upper: section("upper"),
+                lower_size: size("lower_size", 1.0),
+                upper_size: size("upper_size", 0.5),
+                gap: size("gap", 1.0),
+                height: size("height", 0.6),
+                around: if around % 8 == 0 {
+                    around
+                } else {
+                    around + 8 - around % 8
+                },
+            };
+            let made = band::joint(&joint).map_err(|reason| invalid(format!("mesh \"joint\": {reason}")))?;
+            return Ok(Model {
+                mesh: made.mesh,
+                inside: Some(made.inside),
+                free: Some(made.free),
+                ..Model::default()
+            });
+        }
+        "strip" => {
+            let (made, targets) = band::strip(
+                number("around", 64) as usize,
+                number("waves", 3) as usize,
+                size("height", 1.5),
+            );
+            return Ok(Model {
+                mesh: made.mesh,
+                inside: Some(made.inside),
+                free: Some(made.free),
+                targets: Some(targets),
+                ..Model::default()
+            });
+        }
+        "cap" => {
+            let mesh = band::cap(number("rings", 16) as usize, size("angle", 90.0).to_radians())
+                .map_err(|reason| invalid(format!("mesh \"cap\": {reason}")))?;
+            return Ok(Model {
+                mesh,
+                ..Model::default()
+            });
+        }
+        _ => {}
+    }
     let family = FAMILIES
         .iter()
         .find(|family| family.1 == word("family", "regular"))

@@ -6,8 +6,9 @@ use super::metrics;
 use super::model::Model;
 use super::planar_data::{self, Derivatives};
 use super::scheme::{Data, Discretization, Scheme};
-use super::settings::{Condition, DataKind, OnSingular, Settings};
+use super::settings::{Condition, DataKind, Fill, OnSingular, Settings, Solver};
 use super::singular;
+use super::surface_study;
 use super::system::{System, mixed_nullity};
 use crate::fem::surface::{SurfaceOperators, mean_edge_length};
 use crate::mesh::format::{Cells, vtu};
@@ -16,7 +17,7 @@ use crate::method::{Failure, Outcome};
 use crate::optimize::Observer;
 use std::collections::BTreeMap;
 
-fn invalid(reason: String) -> Failure {
+pub(super) fn invalid(reason: String) -> Failure {
     Failure {
         kind: "invalid-input".to_string(),
         reason,
@@ -24,7 +25,7 @@ fn invalid(reason: String) -> Failure {
 }
 
 /// Ends a computation that is to stop.
-fn go_on(observer: &dyn Observer) -> Result<(), Failure> {
+pub(super) fn go_on(observer: &dyn Observer) -> Result<(), Failure> {
     match observer.stop() {
         None => Ok(()),
         Some(stop) => Err(Failure {
@@ -44,9 +45,11 @@ fn go_on(observer: &dyn Observer) -> Result<(), Failure> {
 pub fn run(model: Model, settings: &Settings, observer: &mut dyn Observer) -> Result<Outcome, Failure> {
     let function = function::find(&settings.function)
         .ok_or_else(|| invalid(format!("unknown function \"{}\"", settings.function)))?;
+    let plain = settings.handles.is_none() && settings.fill == Fill::None;
     match settings.data {
-        DataKind::Function | DataKind::Auto => function_study(model, function, settings, observer),
-        _ => Err(invalid("surfaces are not there yet".to_string())),
+        DataKind::Function => function_study(model, function, settings, observer),
+        DataKind::Auto if plain && model.is_planar() => function_study(model, function, settings, observer),
+        _ => surface_study::run(model, settings, observer),
     }
 }
 
@@ -168,7 +171,7 @@ fn function_study(
 }
 
 /// Triangles with a free vertex.
-fn touching(mesh: &TriangleMesh, free: &[bool]) -> Vec<bool> {
+pub(super) fn touching(mesh: &TriangleMesh, free: &[bool]) -> Vec<bool> {
     mesh.cells
         .iter()
         .map(|cell| cell.iter().any(|&vertex| free[vertex as usize]))
@@ -176,7 +179,7 @@ fn touching(mesh: &TriangleMesh, free: &[bool]) -> Vec<bool> {
 }
 
 /// Takes the outermost free vertices away, ring by ring.
-fn shrink(mesh: &TriangleMesh, free: &mut [bool], rings: usize) {
+pub(super) fn shrink(mesh: &TriangleMesh, free: &mut [bool], rings: usize) {
     for _ in 0..rings {
         let before = free.to_vec();
         for cell in &mesh.cells {
@@ -223,33 +226,41 @@ fn solve(
     let solution = system.solve(&discretization, observer)?;
     report.system(&system, solution.residual);
     report.count("solutions", data.components as u64);
+    compare(&discretization, &solution.values, settings, report, observer)?;
+    Ok(solution.values)
+}
+
+/// Solves by the other system and reports the difference, where the settings ask for it.
+pub(super) fn compare(
+    discretization: &Discretization<'_>,
+    values: &[f64],
+    settings: &Settings,
+    report: &mut Report,
+    observer: &mut dyn Observer,
+) -> Result<(), Failure> {
     if settings.compare && settings.has_one_field() {
         observer.phase("compare");
         let mut other = System::new(
-            &discretization,
-            !one_field,
-            super::settings::Solver::Auto,
+            discretization,
+            !settings.one_field(),
+            Solver::Auto,
             &mut Quiet(observer),
         )?;
-        let compared = other.solve(&discretization, &mut Quiet(observer))?;
+        let compared = other.solve(discretization, &mut Quiet(observer))?;
         report.count("factorizations", other.factorizations);
-        report.count("solutions", data.components as u64);
-        let size = solution
-            .values
-            .iter()
-            .fold(0.0, |size: f64, value| size.max(value.abs()));
-        let difference = solution
-            .values
+        report.count("solutions", discretization.components as u64);
+        let size = values.iter().fold(0.0, |size: f64, value| size.max(value.abs()));
+        let difference = values
             .iter()
             .zip(&compared.values)
             .fold(0.0, |worst: f64, (a, b)| worst.max((a - b).abs()));
         report.set("difference", difference / size);
     }
-    Ok(solution.values)
+    Ok(())
 }
 
 /// Passes everything on but phases.
-struct Quiet<'a>(&'a mut dyn Observer);
+pub(super) struct Quiet<'a>(pub &'a mut dyn Observer);
 
 impl Observer for Quiet<'_> {
     fn phase(&mut self, _name: &str) {}
@@ -262,7 +273,7 @@ impl Observer for Quiet<'_> {
 }
 
 /// What is reported of a computation.
-struct Report {
+pub(super) struct Report {
     metrics: BTreeMap<String, f64>,
     counters: BTreeMap<String, u64>,
     notices: Vec<String>,
@@ -270,7 +281,7 @@ struct Report {
 }
 
 impl Report {
-    fn new(model: &Model, domain: &Domain<'_>) -> Self {
+    pub(super) fn new(model: &Model, domain: &Domain<'_>) -> Self {
         let mut report = Self {
             metrics: metrics::ALL
                 .iter()
@@ -293,16 +304,16 @@ impl Report {
         report
     }
 
-    fn set(&mut self, name: &str, value: f64) {
+    pub(super) fn set(&mut self, name: &str, value: f64) {
         self.metrics.insert(name.to_string(), value);
     }
 
-    fn count(&mut self, name: &str, more: u64) {
+    pub(super) fn count(&mut self, name: &str, more: u64) {
         *self.counters.entry(name.to_string()).or_default() += more;
     }
 
     /// Looks for the configurations of Proposition 2 where curve conditions are given.
-    fn singular(&mut self, domain: &Domain<'_>, settings: &Settings) -> Result<(), Failure> {
+    pub(super) fn singular(&mut self, domain: &Domain<'_>, settings: &Settings) -> Result<(), Failure> {
         if settings.condition == Condition::Region || settings.order() == 2 {
             return Ok(());
         }
@@ -344,7 +355,7 @@ impl Report {
         Ok(())
     }
 
-    fn system(&mut self, system: &System, residual: f64) {
+    pub(super) fn system(&mut self, system: &System, residual: f64) {
         self.set("residual", residual);
         self.set("unknowns", system.unknowns() as f64);
         self.set("matrix_entries", system.matrix_entries() as f64);
@@ -361,7 +372,7 @@ impl Report {
         self.reason = format!("solved by {} with relative residual {residual:.1e}", system.solver());
     }
 
-    fn outcome(self, mesh: Vec<u8>) -> Outcome {
+    pub(super) fn outcome(self, mesh: Vec<u8>) -> Outcome {
         Outcome {
             stop: "converged".to_string(),
             reason: self.reason,

@@ -193,6 +193,15 @@ pub static ALL: &[Metric] = &[
         "Mean difference of the two sides' normal curvatures across the seam, times the diagonal of the mesh's box.",
     ),
     metric(
+        "tangent_jump_before",
+        "C1 jump before",
+        "degree",
+        None,
+        Better::Neither,
+        "Mean angle between the two sides' normals over the seam of the surface as it was, for region conditions: what its \
+         own roughness makes of it.",
+    ),
+    metric(
         "displacement_max",
         "max |u - x|",
         "",

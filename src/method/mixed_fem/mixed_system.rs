@@ -4,7 +4,7 @@
 //! pivots of size two stay within a vertex.
 
 use super::scheme::{Discretization, Mass};
-use crate::linalg::sparse::{Elimination, Graph, nested_dissection};
+use crate::linalg::sparse::{Elimination, Graph, geometric_dissection};
 
 /// No unknown.
 const NONE: u32 = u32::MAX;
@@ -61,6 +61,9 @@ pub struct Numbering {
     /// Vertices with an unknown, in the order of their numbers.
     order: Vec<u32>,
     pub count: usize,
+    /// An unknown is its field's value divided by this, so that all coefficients have about the same size whatever the
+    /// edge length: pivots are chosen by size.
+    scale: [f64; 3],
 }
 
 /// The fields in the order in which a vertex's unknowns are numbered.
@@ -83,7 +86,7 @@ impl Numbering {
             Some(name[vertex as usize]).filter(|&index| index != NONE)
         });
         let points: Vec<[f64; 3]> = with.iter().map(|&vertex| domain.mesh.points[vertex as usize]).collect();
-        let elimination = Elimination::new(&graph, &nested_dissection(&graph, &points), discretization.order);
+        let elimination = Elimination::new(&graph, &geometric_dissection(&graph, &points), discretization.order);
         let order: Vec<u32> = elimination.order().iter().map(|&place| with[place as usize]).collect();
         let mut index = vec![[NONE; 3]; vertices];
         let mut count = 0;
@@ -99,6 +102,7 @@ impl Numbering {
             index,
             order,
             count: count as usize,
+            scale: scale(discretization),
         }
     }
 
@@ -109,11 +113,25 @@ impl Numbering {
         for (vertex, index) in self.index.iter().enumerate() {
             if index[field] != NONE {
                 for c in 0..components {
-                    values[vertex * components + c] = solution[c * self.count + index[field] as usize];
+                    let unknown = solution[c * self.count + index[field] as usize];
+                    values[vertex * components + c] = self.scale[field] * unknown;
                 }
             }
         }
         values
+    }
+}
+
+/// With the mean lumped mass `m`, coefficients are of size 1 for `L`, `m` for `M` and `m^2` for `S`.
+fn scale(discretization: &Discretization<'_>) -> [f64; 3] {
+    let lumped = discretization.lumped();
+    let used = lumped.iter().filter(|&&mass| mass > 0.0);
+    let (sum, count) = used.fold((0.0, 0), |(sum, count), mass| (sum + mass, count + 1));
+    let mean: f64 = if count > 0 { sum / f64::from(count) } else { 1.0 };
+    if discretization.order == 2 {
+        [mean.sqrt(), 1.0 / mean.sqrt(), 1.0]
+    } else {
+        [mean, 1.0, 1.0 / mean]
     }
 }
 
@@ -163,7 +181,7 @@ pub fn matrix(discretization: &Discretization<'_>, numbering: &Numbering) -> Low
         coefficients(discretization, vertex, |row, other, column, value| {
             let index = numbering.index[other][column];
             if own[row] != NONE && index != NONE && index >= own[row] && (value != 0.0 || index == own[row]) {
-                columns[row].push((index, value));
+                columns[row].push((index, numbering.scale[row] * value * numbering.scale[column]));
             }
         });
         for field in FIELDS {
@@ -194,17 +212,18 @@ pub fn right_side(discretization: &Discretization<'_>, numbering: &Numbering) ->
         for c in 0..components {
             let at = vertex as usize * components + c;
             if own[0] != NONE {
-                right[c * numbering.count + own[0] as usize] += discretization.load[at];
+                right[c * numbering.count + own[0] as usize] += numbering.scale[0] * discretization.load[at];
             }
             if own[flux_field] != NONE {
-                right[c * numbering.count + own[flux_field] as usize] -= discretization.flux[at];
+                right[c * numbering.count + own[flux_field] as usize] -=
+                    numbering.scale[flux_field] * discretization.flux[at];
             }
         }
         coefficients(discretization, vertex, |row, other, column, value| {
             if own[row] != NONE && numbering.index[other][column] == NONE && value != 0.0 {
                 for c in 0..components {
                     right[c * numbering.count + own[row] as usize] -=
-                        value * discretization.known[column][other * components + c];
+                        numbering.scale[row] * value * discretization.known[column][other * components + c];
                 }
             }
         });

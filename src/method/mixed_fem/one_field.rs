@@ -4,8 +4,9 @@
 //! `(P^T (-L) P + C^T S^-1 C) u = ...` with `P = D^-1 B` and `C = L` from the unknown `u` to the relaxed boundary rows.
 
 use super::scheme::Discretization;
-use crate::linalg::sparse::{BlockPattern, FIXED};
+use crate::linalg::sparse::{BlockPattern, FIXED, geometric_dissection};
 use crate::method::Failure;
+use crate::optimize::Observer;
 
 /// A one-field system: structure and matrix.
 pub struct OneField {
@@ -82,7 +83,8 @@ impl OneField {
     ///
     /// # Errors
     /// When the structure is too large to be numbered.
-    pub fn new(discretization: &Discretization<'_>) -> Result<Self, Failure> {
+    pub fn new(discretization: &Discretization<'_>, observer: &mut dyn Observer) -> Result<Self, Failure> {
+        observer.phase("assemble");
         let domain = discretization.domain;
         let pattern = &discretization.operators.pattern;
         let laplacian = &discretization.operators.laplacian;
@@ -158,10 +160,14 @@ impl OneField {
             });
         }
         let points: Vec<[f64; 3]> = free.iter().map(|&vertex| domain.mesh.points[vertex as usize]).collect();
-        let pattern = BlockPattern::<1>::new(&points, &edges, &vec![true; points.len()]).map_err(|error| Failure {
-            kind: "invalid-input".to_string(),
-            reason: format!("the one-field system cannot be set up: {error}"),
-        })?;
+        observer.phase("order");
+        let all = vec![true; points.len()];
+        let pattern =
+            BlockPattern::<1>::with_order(&points, &edges, &all, geometric_dissection).map_err(|error| Failure {
+                kind: "invalid-input".to_string(),
+                reason: format!("the one-field system cannot be set up: {error}"),
+            })?;
+        observer.phase("assemble");
         let mut values = vec![0.0; pattern.values_len()];
         pattern.assemble(&parts, &mut values);
         for (vertex, &entry) in diagonal.iter().enumerate() {

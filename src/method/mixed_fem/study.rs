@@ -128,7 +128,18 @@ fn function_study(
     let mut report = Report::new(&model, &domain);
     report.singular(&domain, settings)?;
     go_on(observer)?;
-    let values = solve(&domain, &data, settings, &mut report, observer)?;
+    let values = match solve(&domain, &data, settings, &mut report, observer) {
+        // Asked to go on, a job without a solution still tells the nullity.
+        Err(failure) if failure.kind == "singular" && settings.on_singular == OnSingular::Continue => {
+            return Ok(Outcome {
+                stop: failure.kind,
+                reason: failure.reason,
+                mesh: None,
+                ..report.outcome(Vec::new())
+            });
+        }
+        solved => solved?,
+    };
     observer.phase("measure");
     let errors = planar_data::errors(&domain, function, &values);
     report.set("l2_error", errors.l2);

@@ -174,6 +174,13 @@ fn measure(
         prescribed.beyond[vertex as usize]
     });
     let size = diagonal(places);
+    if region {
+        let before = jumps(sides, rest, |vertex, across| {
+            let fit = sides.fit(rest, vertex, false)?;
+            Some((fit.normal, fit.curvature(across)))
+        });
+        report.set("tangent_jump_before", before.tangent_mean);
+    }
     if found.vertices > 0 {
         report.set("tangent_jump_max", found.tangent_max);
         report.set("tangent_jump_mean", found.tangent_mean);
@@ -232,10 +239,11 @@ fn vertex_normals(mesh: &TriangleMesh, places: &[[f64; 3]]) -> Vec<[f64; 3]> {
     normals
 }
 
-/// Stripes of equal brightness under a far light: kinks in them show breaks of the tangent, breaks a jump of the normal.
+/// Waves of brightness under a far light: their crests are isophotes, whose kinks show jumps of the curvature and whose
+/// breaks show jumps of the tangent.
 fn isophotes(mesh: &TriangleMesh, normals: &[[f64; 3]]) -> Vec<f64> {
     const LIGHT: [f64; 3] = [0.486_664, 0.324_443, 0.811_107];
-    const STRIPES: f64 = 12.0;
+    const WAVES: f64 = 8.0;
     mesh.cells
         .iter()
         .map(|cell| {
@@ -243,7 +251,7 @@ fn isophotes(mesh: &TriangleMesh, normals: &[[f64; 3]]) -> Vec<f64> {
                 cell.iter().map(|&vertex| normals[vertex as usize][axis]).sum::<f64>() / 3.0
             });
             let brightness = dot(mean, LIGHT) / length(mean).max(f64::MIN_POSITIVE);
-            (0.5 * STRIPES * (brightness + 1.0)).floor().rem_euclid(2.0)
+            0.5 + 0.5 * (std::f64::consts::TAU * WAVES * 0.5 * brightness).cos()
         })
         .collect()
 }

@@ -44,8 +44,7 @@ impl System {
         observer: &mut dyn Observer,
     ) -> Result<Self, Failure> {
         if one_field {
-            observer.phase("assemble");
-            let system = OneField::new(discretization)?;
+            let system = OneField::new(discretization, observer)?;
             let free: Vec<u32> = (0..discretization.unknown[0].len() as u32)
                 .filter(|&vertex| discretization.unknown[0][vertex as usize])
                 .collect();

@@ -14,6 +14,7 @@ mod kernels;
 mod keys;
 mod mapping;
 mod mesh_checks;
+mod mixed_fem;
 mod optimizers;
 mod page;
 mod plan;

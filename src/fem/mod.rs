@@ -1,1 +1,4 @@
 //! Finite elements: reference cells, quadrature, bases and spaces of degrees of freedom.
+
+pub mod surface;
+pub mod triangle_rule;

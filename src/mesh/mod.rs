@@ -8,6 +8,8 @@ pub mod split;
 pub mod check;
 pub mod summary;
 pub mod generate;
+pub mod planar;
+pub mod band;
 pub mod target;
 pub mod format;
 

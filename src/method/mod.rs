@@ -5,6 +5,7 @@
 
 pub mod setting;
 pub mod model;
+pub mod mixed_fem;
 pub mod volume_map;
 
 use crate::metric::Metric;
@@ -94,7 +95,7 @@ pub trait Method: Sync {
 
 /// Every method, in the order of the documentation.
 pub fn methods() -> &'static [&'static dyn Method] {
-    &[&volume_map::VolumeMap]
+    &[&volume_map::VolumeMap, &mixed_fem::MixedFem]
 }
 
 /// The method of this name.

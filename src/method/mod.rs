@@ -76,6 +76,11 @@ pub trait Method: Sync {
     }
     /// The metrics that every record of this method holds.
     fn metrics(&self) -> &'static [Metric];
+    /// Settings and axes across which values of this metric mean different things, such as energies of different
+    /// densities: no table calls one of them the best.
+    fn incomparable(&self, _metric: &str) -> &'static [&'static str] {
+        &[]
+    }
     /// Names and meanings of the columns in [`Outcome::traces`], such as `iteration` and `energy`.
     fn traces(&self) -> &'static [(&'static str, &'static str)] {
         &[]

@@ -6,6 +6,7 @@
 pub mod setting;
 pub mod model;
 pub mod volume_map;
+pub mod centroidal_voronoi;
 
 use crate::metric::Metric;
 use crate::optimize::Observer;
@@ -94,7 +95,7 @@ pub trait Method: Sync {
 
 /// Every method, in the order of the documentation.
 pub fn methods() -> &'static [&'static dyn Method] {
-    &[&volume_map::VolumeMap]
+    &[&volume_map::VolumeMap, &centroidal_voronoi::CentroidalVoronoi]
 }
 
 /// The method of this name.

@@ -5,8 +5,9 @@
 
 pub mod setting;
 pub mod model;
-pub mod mixed_fem;
 pub mod volume_map;
+pub mod centroidal_voronoi;
+pub mod mixed_fem;
 
 use crate::metric::Metric;
 use crate::optimize::Observer;
@@ -95,7 +96,11 @@ pub trait Method: Sync {
 
 /// Every method, in the order of the documentation.
 pub fn methods() -> &'static [&'static dyn Method] {
-    &[&volume_map::VolumeMap, &mixed_fem::MixedFem]
+    &[
+        &volume_map::VolumeMap,
+        &centroidal_voronoi::CentroidalVoronoi,
+        &mixed_fem::MixedFem,
+    ]
 }
 
 /// The method of this name.

@@ -2,3 +2,4 @@
 
 pub mod surface;
 pub mod triangle_rule;
+pub mod bernstein_hexahedron;

@@ -1,4 +1,4 @@
-//! Meshes in flat arrays: triangle surfaces and tetrahedral volumes, their connectivity, generators, readers and writers.
+//! Meshes in flat arrays: triangle and quadrilateral surfaces, tetrahedral volumes, their connectivity, generators, readers and writers.
 //!
 //! Nothing here opens a file: readers take bytes, writers take `std::io::Write`.
 
@@ -6,6 +6,7 @@ pub mod connectivity;
 pub mod quality;
 pub mod split;
 pub mod check;
+pub mod quadrilateral;
 pub mod summary;
 pub mod generate;
 pub mod planar;

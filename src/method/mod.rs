@@ -7,6 +7,7 @@ pub mod setting;
 pub mod model;
 pub mod volume_map;
 pub mod centroidal_voronoi;
+pub mod g1_surface;
 pub mod mixed_fem;
 
 use crate::metric::Metric;
@@ -99,6 +100,7 @@ pub fn methods() -> &'static [&'static dyn Method] {
     &[
         &volume_map::VolumeMap,
         &centroidal_voronoi::CentroidalVoronoi,
+        &g1_surface::G1Surface,
         &mixed_fem::MixedFem,
     ]
 }

@@ -11,6 +11,7 @@ pub mod bumpy;
 pub mod cube;
 pub mod ellipsoid;
 pub mod star;
+pub mod surface;
 pub mod twisted_grid;
 
 use super::connectivity;

@@ -5,6 +5,7 @@
 
 pub mod setting;
 pub mod model;
+pub mod surface_fit;
 pub mod volume_map;
 
 use crate::metric::Metric;
@@ -89,7 +90,7 @@ pub trait Method: Sync {
 
 /// Every method, in the order of the documentation.
 pub fn methods() -> &'static [&'static dyn Method] {
-    &[&volume_map::VolumeMap]
+    &[&volume_map::VolumeMap, &surface_fit::SurfaceFit]
 }
 
 /// The method of this name.

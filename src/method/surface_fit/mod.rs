@@ -150,7 +150,7 @@ pub fn run(problem: &Problem, settings: &Settings, observer: &mut dyn Observer) 
                 stopping: Stopping {
                     gradient_norm: settings.gradient_tolerance,
                     relative_decrement: 0.0,
-                    relative_change: settings.change_tolerance,
+                    relative_change: stage.change_tolerance,
                     iterations: settings.iteration_limit,
                     ..Stopping::default()
                 },

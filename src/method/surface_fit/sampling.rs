@@ -8,8 +8,10 @@ use crate::mesh::{TriangleMesh, area_vector, length, subtract};
 use crate::method::Failure;
 use crate::optimize::Observer;
 
-/// Facets serve as samples when none has an edge beyond this share of the diagonal.
+/// Facets serve as samples when none has an edge beyond this share of the diagonal,
 const EVEN: f64 = 0.05;
+/// and there are at least as many as vertices, and at most this many times that: more cost time and gain nothing.
+const PLENTY: usize = 16;
 
 /// See the module.
 #[derive(Clone, Debug)]
@@ -37,7 +39,7 @@ pub fn sample(
                 .max(length(subtract(c, b)))
                 .max(length(subtract(a, c)))
         });
-        target.cells.len() >= vertices && longest.fold(0.0, f64::max) <= EVEN
+        (vertices..=PLENTY * vertices).contains(&target.cells.len()) && longest.fold(0.0, f64::max) <= EVEN
     };
     let facets = match settings.sampling {
         Sampling::Facets => true,

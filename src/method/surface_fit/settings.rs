@@ -107,7 +107,7 @@ pub static FIELDS: &[Field] = &[
         kind: Kind::Choice(&[
             (
                 "auto",
-                "facets where they are small, even and at least as many as the fit's vertices, else tessellation",
+                "facets where they are small and one to sixteen times as many as the fit's vertices, else tessellation",
             ),
             ("facets", "the centres of the target's triangles, with their normals"),
             (
@@ -125,7 +125,7 @@ pub static FIELDS: &[Field] = &[
             max: 10_000_000,
         },
         default: Default::Integer(0),
-        doc: "Points of a tessellation; 0 for as many as the fitted mesh has vertices.",
+        doc: "Points of a tessellation; 0 for twice as many as the fitted mesh has vertices.",
     },
     Field {
         name: "sampling_iterations",
@@ -147,9 +147,13 @@ pub static FIELDS: &[Field] = &[
     },
     Field {
         name: "change_tolerance",
-        kind: Kind::Number { min: 0.0, max: 1.0 },
-        default: Default::Number(1e-5),
-        doc: "A stage is done when one step lowers the energy by less than this share of it.",
+        kind: Kind::OneOf(&[
+            Kind::Number { min: 0.0, max: 1.0 },
+            Kind::List(&Kind::Number { min: 0.0, max: 1.0 }),
+        ]),
+        default: Default::Absent,
+        doc: "A stage is done when one step lowers the energy by less than this share of it; or a list with one entry a \
+              stage. Preset best: [0.003, 0.0003], paper: 0.0001.",
     },
     Field {
         name: "gradient_tolerance",
@@ -209,7 +213,7 @@ pub enum Sampling {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Settings {
     pub terms: Terms,
-    /// One entry a stage, as is `regularization`.
+    /// One entry a stage, as are `regularization` and `change_tolerance`.
     pub anisotropy: Vec<f64>,
     pub regularization: Vec<f64>,
     pub gradient: Gradient,
@@ -223,7 +227,7 @@ pub struct Settings {
     pub sampling_iterations: usize,
     pub seed: u64,
     pub iteration_limit: u64,
-    pub change_tolerance: f64,
+    pub change_tolerance: Vec<f64>,
     pub gradient_tolerance: f64,
     pub memory: usize,
     pub feature_angle: f64,
@@ -234,7 +238,11 @@ pub struct Settings {
 pub struct Stage {
     pub anisotropy: f64,
     pub regularization: f64,
+    pub change_tolerance: f64,
 }
+
+/// The settings that may have one entry a stage.
+const SCHEDULES: [&str; 3] = ["anisotropy", "regularization", "change_tolerance"];
 
 impl Settings {
     /// Reads validated settings, full or canonical. Fields that are absent take the preset's or the declared value.
@@ -262,8 +270,13 @@ impl Settings {
         };
         preset("anisotropy", Value::from(vec![1.0, 50.0]), Value::from(vec![50.0]));
         preset("regularization", Value::from(vec![2e-4, 2e-4]), Value::from(vec![2e-4]));
+        preset(
+            "change_tolerance",
+            Value::from(vec![3e-3, 3e-4]),
+            Value::from(vec![1e-4]),
+        );
         preset("limit", Value::from(true), Value::from(false));
-        for name in ["anisotropy", "regularization"] {
+        for name in SCHEDULES {
             if let Some(value) = table.get_mut(name)
                 && value.is_number()
             {
@@ -285,12 +298,23 @@ impl Settings {
 
     /// The minimizations, one after the other.
     pub fn stages(&self) -> Vec<Stage> {
+        // Tolerances alone make no stages.
         let count = self.anisotropy.len().max(self.regularization.len());
         let entry = |list: &[f64], stage: usize| list.get(stage).or(list.last()).copied().unwrap_or(0.0);
+        // The last stage gets the last tolerance, however many there are.
+        let tolerance = |stage: usize| {
+            let last = self.change_tolerance.last().copied().unwrap_or(0.0);
+            if stage + 1 == count {
+                last
+            } else {
+                entry(&self.change_tolerance, stage)
+            }
+        };
         (0..count)
             .map(|stage| Stage {
                 anisotropy: entry(&self.anisotropy, stage),
                 regularization: entry(&self.regularization, stage),
+                change_tolerance: tolerance(stage),
             })
             .collect()
     }
@@ -305,6 +329,7 @@ impl Settings {
         let column = |value: fn(&Stage) -> f64| Value::from(stages.iter().map(value).collect::<Vec<f64>>());
         table.insert("anisotropy".to_string(), column(|stage| stage.anisotropy));
         table.insert("regularization".to_string(), column(|stage| stage.regularization));
+        table.insert("change_tolerance".to_string(), column(|stage| stage.change_tolerance));
         if self.subdivisions == 0 {
             table.insert("limit".to_string(), Value::from(false));
             if self.refinements == 0 {
@@ -321,18 +346,21 @@ impl Settings {
 }
 
 fn empty_list(settings: &Settings) -> Option<&'static str> {
-    if settings.anisotropy.is_empty() {
-        Some("anisotropy")
-    } else if settings.regularization.is_empty() {
-        Some("regularization")
-    } else {
-        None
-    }
+    let lists = [
+        &settings.anisotropy,
+        &settings.regularization,
+        &settings.change_tolerance,
+    ];
+    SCHEDULES
+        .into_iter()
+        .zip(lists)
+        .find(|(_, list)| list.is_empty())
+        .map(|(name, _)| name)
 }
 
 /// Checks that go across fields: path of the offending field and message.
 pub fn check(settings: &Value) -> Vec<(String, String)> {
-    ["anisotropy", "regularization"]
+    SCHEDULES
         .into_iter()
         .filter(|name| settings.get(name).and_then(Value::as_array).is_some_and(Vec::is_empty))
         .map(|name| (name.to_string(), "an empty list; give one value a stage".to_string()))

@@ -1,5 +1,7 @@
 //! One test binary; a file a property.
 
+mod catmull_clark;
+mod closest_point;
 mod commands;
 mod connectivity;
 mod damaged_files;
@@ -26,6 +28,7 @@ mod sample;
 mod sparse;
 mod squared_distance;
 mod store;
+mod surface_fit;
 mod tiny_method;
 mod volume_map;
 mod volume_map_feasibility;

@@ -6,6 +6,7 @@ pub mod connectivity;
 pub mod quality;
 pub mod split;
 pub mod check;
+pub mod mixed;
 pub mod summary;
 pub mod generate;
 pub mod target;

@@ -23,6 +23,7 @@ mod reports;
 mod runner;
 mod sample;
 mod sparse;
+mod squared_distance;
 mod store;
 mod tiny_method;
 mod volume_map;

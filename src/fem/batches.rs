@@ -28,10 +28,15 @@ pub fn unit_reference(shape: Shape) -> Columns<f64> {
 }
 
 /// Unit references scaled so that all together have this volume.
-pub fn references_of_volume(shapes: impl Iterator<Item = Shape> + Clone, volume: f64) -> Vec<Columns<f64>> {
-    let unit: f64 = shapes.clone().map(|shape| reference_volume(shape, &unit_reference(shape))).sum();
+pub fn references_of_volume(shapes: impl Iterator<Item = Shape>, volume: f64) -> Vec<Columns<f64>> {
+    let shapes: Vec<Shape> = shapes.collect();
+    let unit: f64 = shapes
+        .iter()
+        .map(|&shape| reference_volume(shape, &unit_reference(shape)))
+        .sum();
     let scale = (volume / unit).cbrt();
     shapes
+        .into_iter()
         .map(|shape| unit_reference(shape).map(|column| times(column, scale)))
         .collect()
 }
@@ -128,6 +133,28 @@ impl Batches {
         groups
             .flat_map(|(group, members)| (0..members.batches.len()).map(move |batch| (group, batch)))
             .collect()
+    }
+
+    /// Calls `visit(cell, point, place)` for every point of every cell of a batch.
+    pub fn visit_places(
+        &self,
+        processor: Processor,
+        (group, batch): (usize, usize),
+        x: &[f64],
+        mut visit: impl FnMut(usize, usize, [f64; 3]),
+    ) {
+        let group = &self.groups[group];
+        let batch = &group.batches[batch];
+        let mut coefficients = vec![Lanes::ZERO; group.coefficients()];
+        load_coefficients(batch, x, &mut coefficients);
+        let mut places = vec![Lanes::ZERO; 3 * group.element.points()];
+        group.element.places(processor, &coefficients, &mut places, &mut Room::default());
+        for lane in 0..batch.filled {
+            for (point, place) in places.chunks_exact(3).enumerate() {
+                let place = std::array::from_fn(|component| place[component].0[lane]);
+                visit(batch.cells[lane] as usize, point, place);
+            }
+        }
     }
 
     /// Calls `visit(cell, point, J)` for every point of every cell of a batch, J against the reference.

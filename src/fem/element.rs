@@ -86,7 +86,8 @@ enum Factors {
         values: Matrix,
         slopes: Matrix,
     },
-    Tetrahedron([Matrix; 3]),
+    /// Values, then derivatives.
+    Tetrahedron([Matrix; 4]),
 }
 
 /// The tables of one kind of cell at given points.
@@ -142,7 +143,7 @@ impl Element {
             CellQuadrature::Tetrahedron(scattered) => {
                 let table = tetrahedron_table(basis, order, &scattered.points);
                 let [u, v, w] = &table.derivatives;
-                Factors::Tetrahedron([u, v, w].map(|entries| Matrix::of(&table, entries)))
+                Factors::Tetrahedron([&table.values, u, v, w].map(|entries| Matrix::of(&table, entries)))
             }
         };
         let shape = match quadrature {
@@ -165,6 +166,36 @@ impl Element {
     /// The number of points.
     pub fn points(&self) -> usize {
         self.points
+    }
+
+    /// The map itself, each place at `3 point + component`.
+    pub fn places(&self, processor: Processor, coefficients: &[Lanes], places: &mut [Lanes], rooms: &mut Room) {
+        let p = processor;
+        match &self.factors {
+            Factors::Hexahedron { values, .. } => {
+                let (n, q) = (values.columns, values.rows);
+                let along = room(&mut rooms.a, 3 * n * n * q);
+                values.apply(p, n * n, 3, coefficients, along);
+                let plane = room(&mut rooms.c, 3 * n * q * q);
+                values.apply(p, n, 3 * q, along, plane);
+                values.apply(p, 1, 3 * q * q, plane, places);
+            }
+            Factors::Prism { triangles, values, .. } => {
+                let (n, t, q) = (values.columns, triangles[0][0].columns, triangles[0][0].rows);
+                let levels = room(&mut rooms.a, 3 * n * q);
+                for level in 0..n {
+                    triangles[level.min(2)][0].apply(
+                        p,
+                        1,
+                        3,
+                        &coefficients[3 * t * level..3 * t * (level + 1)],
+                        &mut levels[3 * q * level..3 * q * (level + 1)],
+                    );
+                }
+                values.apply(p, 1, 3 * q, levels, places);
+            }
+            Factors::Tetrahedron([values, ..]) => values.apply(p, 1, 3, coefficients, places),
+        }
     }
 
     /// Derivatives of the map by the canonical coordinates, each at `3 point + component`.
@@ -225,7 +256,7 @@ impl Element {
                 }
                 slopes.apply(p, 1, 3 * q, levels, dw);
             }
-            Factors::Tetrahedron([u, v, w]) => {
+            Factors::Tetrahedron([_, u, v, w]) => {
                 u.apply(p, 1, 3, coefficients, du);
                 v.apply(p, 1, 3, coefficients, dv);
                 w.apply(p, 1, 3, coefficients, dw);
@@ -281,7 +312,7 @@ impl Element {
                     }
                 }
             }
-            Factors::Tetrahedron([u, v, w]) => {
+            Factors::Tetrahedron([_, u, v, w]) => {
                 u.transposed(p, 1, 3, du, coefficients, false);
                 v.transposed(p, 1, 3, dv, coefficients, true);
                 w.transposed(p, 1, 3, dw, coefficients, true);

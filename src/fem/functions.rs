@@ -11,6 +11,8 @@
 //! vertex number, an edge runs from the smaller to the larger: so the functions of both cells agree on it.
 
 use super::basis::Basis;
+use super::quadrature::CellQuadrature;
+use super::space::Kind;
 use std::ops::{Add, Mul, Sub};
 
 /// Local corners of a triangle's edges in the order of its functions.
@@ -214,4 +216,68 @@ pub fn tetrahedron_table(basis: &dyn Basis, order: usize, points: &[[f64; 3]]) -
 fn edge_function<const N: usize>(basis: &dyn Basis, la: Dual<N>, lb: Dual<N>, j: usize) -> Dual<N> {
     let along = lb - la;
     la * lb * along.of(basis.kernel(j, along.value.clamp(-1.0, 1.0)))
+}
+
+/// All local functions of a kind of cell at the nodes of a quadrature, in the order of the cell's slots.
+pub fn cell_table(basis: &dyn Basis, kind: Kind, quadrature: &CellQuadrature) -> Table<3> {
+    let mut table = Table::new(kind.functions());
+    match quadrature {
+        CellQuadrature::Hexahedron(line) => {
+            let lines = line_table(basis, kind.order, &line.points);
+            let (q, n) = (lines.points, lines.functions);
+            let [slopes] = &lines.derivatives;
+            for u in 0..q {
+                for v in 0..q {
+                    for w in 0..q {
+                        let mut row = Vec::with_capacity(n * n * n);
+                        for i in 0..n {
+                            for j in 0..n {
+                                for k in 0..n {
+                                    let (a, b, c) = (u * n + i, v * n + j, w * n + k);
+                                    let values = &lines.values;
+                                    row.push(Dual {
+                                        value: values[a] * values[b] * values[c],
+                                        slopes: [
+                                            slopes[a] * values[b] * values[c],
+                                            values[a] * slopes[b] * values[c],
+                                            values[a] * values[b] * slopes[c],
+                                        ],
+                                    });
+                                }
+                            }
+                        }
+                        table.push(&row);
+                    }
+                }
+            }
+        }
+        CellQuadrature::Prism(triangle, line) => {
+            let lines = line_table(basis, kind.order, &line.points);
+            let levels = [kind.last[0], kind.last[1], 2].map(|last| triangle_table(basis, kind.order, last, &triangle.points));
+            let n = lines.functions;
+            for w in 0..lines.points {
+                for point in 0..triangle.points.len() {
+                    let mut row = Vec::new();
+                    for level in 0..n {
+                        let triangles = &levels[level.min(2)];
+                        let (value, slope) = (lines.values[w * n + level], lines.derivatives[0][w * n + level]);
+                        for t in 0..triangles.functions {
+                            let place = point * triangles.functions + t;
+                            row.push(Dual {
+                                value: triangles.values[place] * value,
+                                slopes: [
+                                    triangles.derivatives[0][place] * value,
+                                    triangles.derivatives[1][place] * value,
+                                    triangles.values[place] * slope,
+                                ],
+                            });
+                        }
+                    }
+                    table.push(&row);
+                }
+            }
+        }
+        CellQuadrature::Tetrahedron(scattered) => return tetrahedron_table(basis, kind.order, &scattered.points),
+    }
+    table
 }

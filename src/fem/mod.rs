@@ -12,3 +12,4 @@ mod contraction;
 pub mod element;
 pub mod batches;
 pub mod volume_energy;
+pub mod boundary;

@@ -19,6 +19,10 @@ impl Slot {
     /// A function that is absent.
     pub const ABSENT: Slot = Slot(NONE);
 
+    pub(super) fn of(node: usize, negative: bool) -> Slot {
+        Slot::new(node, negative)
+    }
+
     fn new(node: usize, negative: bool) -> Slot {
         Slot((node as u32) << 1 | u32::from(negative))
     }
@@ -389,6 +393,19 @@ impl Space {
         let mut x = points.as_flattened().to_vec();
         x.resize(3 * self.nodes, 0.0);
         x
+    }
+
+    /// For every node, the node of another space over the same mesh with the same function, if it has one.
+    pub fn counterparts(&self, other: &Space) -> Vec<Option<u32>> {
+        let mut result = vec![None; self.nodes];
+        for (from, to) in self.cells.iter().zip(&other.cells) {
+            for (slot, local) in common_functions(from.kind.shape, from.kind.order, to.kind.order) {
+                if let (Some((source, _)), Some((target, _))) = (from.slots[slot].node(), to.slots[local].node()) {
+                    result[source] = Some(target as u32);
+                }
+            }
+        }
+        result
     }
 
     /// The same map in a space over the same mesh with other orders: functions that both have keep their nodes, others

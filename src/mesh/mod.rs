@@ -10,6 +10,7 @@ pub mod mixed;
 pub mod summary;
 pub mod generate;
 pub mod target;
+pub mod template;
 pub mod format;
 
 /// A mesh of cells with `N` vertices each: `points` in model units, `cells` as indices into `points`.
@@ -41,6 +42,11 @@ pub(crate) fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
         a[2] * b[0] - a[0] * b[2],
         a[0] * b[1] - a[1] * b[0],
     ]
+}
+
+/// `a + factor b`.
+pub(crate) fn add_scaled(a: [f64; 3], b: [f64; 3], factor: f64) -> [f64; 3] {
+    [a[0] + factor * b[0], a[1] + factor * b[1], a[2] + factor * b[2]]
 }
 
 /// The Euclidean length.

@@ -6,6 +6,7 @@
 pub mod setting;
 pub mod model;
 pub mod volume_map;
+pub mod volume_fit;
 
 use crate::metric::Metric;
 use crate::optimize::Observer;
@@ -89,7 +90,7 @@ pub trait Method: Sync {
 
 /// Every method, in the order of the documentation.
 pub fn methods() -> &'static [&'static dyn Method] {
-    &[&volume_map::VolumeMap]
+    &[&volume_map::VolumeMap, &volume_fit::VolumeFit]
 }
 
 /// The method of this name.

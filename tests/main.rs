@@ -6,6 +6,7 @@ mod commands;
 mod connectivity;
 mod damaged_files;
 mod distortion;
+mod element_functions;
 mod energies;
 mod experiment_files;
 mod floors;

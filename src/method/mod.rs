@@ -6,6 +6,7 @@
 pub mod setting;
 pub mod model;
 pub mod volume_map;
+pub mod volume_fit;
 pub mod surface_fit;
 pub mod centroidal_voronoi;
 pub mod g1_surface;
@@ -100,6 +101,7 @@ pub trait Method: Sync {
 pub fn methods() -> &'static [&'static dyn Method] {
     &[
         &volume_map::VolumeMap,
+        &volume_fit::VolumeFit,
         &surface_fit::SurfaceFit,
         &centroidal_voronoi::CentroidalVoronoi,
         &g1_surface::G1Surface,

@@ -1,9 +1,12 @@
 //! One test binary; a file a property.
 
+mod catmull_clark;
+mod closest_point;
 mod commands;
 mod connectivity;
 mod damaged_files;
 mod distortion;
+mod element_functions;
 mod energies;
 mod experiment_files;
 mod floors;
@@ -15,16 +18,20 @@ mod kernels;
 mod keys;
 mod mapping;
 mod mesh_checks;
+mod mixed_fem;
 mod optimizers;
 mod page;
 mod plan;
 mod quadrilaterals;
 mod rates;
 mod reports;
+mod restricted_voronoi;
 mod runner;
 mod sample;
 mod sparse;
+mod squared_distance;
 mod store;
+mod surface_fit;
 mod tiny_method;
 mod volume_map;
 mod volume_map_feasibility;

@@ -3,9 +3,9 @@
 use super::hexahedra::Shell;
 use super::patch::{Operator, Reference, Solve};
 use crate::method::Failure;
-use crate::method::setting::{Default, Field, Kind};
+use crate::method::setting::{Default, Field, Kind, fill};
 use serde::{Deserialize, Serialize};
-use serde_json::{Map, Value};
+use serde_json::Value;
 
 /// Everything that `[settings]` may hold.
 pub static FIELDS: &[Field] = &[
@@ -386,28 +386,6 @@ impl Settings {
         }
         Value::Object(table)
     }
-}
-
-/// The given table with declared defaults where it is silent.
-fn fill(fields: &[Field], given: &Value) -> Map<String, Value> {
-    let mut table = Map::new();
-    for field in fields {
-        let value = match (&field.kind, given.get(field.name)) {
-            (Kind::Table(inner), given) => Some(Value::Object(fill(inner, given.unwrap_or(&Value::Null)))),
-            (_, Some(value)) => Some(value.clone()),
-            (_, None) => match &field.default {
-                Default::Boolean(value) => Some(Value::from(*value)),
-                Default::Integer(value) => Some(Value::from(*value)),
-                Default::Number(value) => Some(Value::from(*value)),
-                Default::Text(value) => Some(Value::from(*value)),
-                Default::Required | Default::Absent | Default::Fields => None,
-            },
-        };
-        if let Some(value) = value {
-            table.insert(field.name.to_string(), value);
-        }
-    }
-    table
 }
 
 /// Checks that go across fields: path of the offending field and message.

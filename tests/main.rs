@@ -1,5 +1,6 @@
 //! One test binary; a file a property.
 
+mod centroidal_voronoi;
 mod commands;
 mod connectivity;
 mod damaged_files;

@@ -133,7 +133,7 @@ pub struct RestrictedVoronoi {
     /// The site nearest to the vertex at the same place of `vertex_order`, and then to every vertex.
     ordered: Vec<u32>,
     nearest: Vec<u32>,
-    pool: Mutex<Vec<Box<Scratch>>>,
+    pool: Mutex<Vec<Scratch>>,
 }
 
 impl RestrictedVoronoi {
@@ -263,7 +263,7 @@ impl RestrictedVoronoi {
         true
     }
 
-    fn take(&self) -> Box<Scratch> {
+    fn take(&self) -> Scratch {
         self.pool
             .lock()
             .ok()
@@ -271,7 +271,7 @@ impl RestrictedVoronoi {
             .unwrap_or_default()
     }
 
-    fn give(&self, scratch: Box<Scratch>) {
+    fn give(&self, scratch: Scratch) {
         if let Ok(mut pool) = self.pool.lock() {
             pool.push(scratch);
         }

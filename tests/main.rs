@@ -1,10 +1,13 @@
 //! One test binary; a file a property.
 
+mod catmull_clark;
 mod centroidal_voronoi;
+mod closest_point;
 mod commands;
 mod connectivity;
 mod damaged_files;
 mod distortion;
+mod element_functions;
 mod energies;
 mod experiment_files;
 mod floors;
@@ -15,6 +18,7 @@ mod kernels;
 mod keys;
 mod mapping;
 mod mesh_checks;
+mod mixed_fem;
 mod optimizers;
 mod page;
 mod plan;
@@ -26,6 +30,7 @@ mod sample;
 mod sparse;
 mod squared_distance;
 mod store;
+mod surface_fit;
 mod tiny_method;
 mod volume_map;
 mod volume_map_feasibility;

@@ -6,7 +6,11 @@
 pub mod setting;
 pub mod model;
 pub mod volume_map;
+pub mod volume_fit;
+pub mod surface_fit;
 pub mod centroidal_voronoi;
+pub mod g1_surface;
+pub mod mixed_fem;
 
 use crate::metric::Metric;
 use crate::optimize::Observer;
@@ -95,7 +99,14 @@ pub trait Method: Sync {
 
 /// Every method, in the order of the documentation.
 pub fn methods() -> &'static [&'static dyn Method] {
-    &[&volume_map::VolumeMap, &centroidal_voronoi::CentroidalVoronoi]
+    &[
+        &volume_map::VolumeMap,
+        &volume_fit::VolumeFit,
+        &surface_fit::SurfaceFit,
+        &centroidal_voronoi::CentroidalVoronoi,
+        &g1_surface::G1Surface,
+        &mixed_fem::MixedFem,
+    ]
 }
 
 /// The method of this name.

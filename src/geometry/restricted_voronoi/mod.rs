@@ -449,7 +449,7 @@ impl RestrictedVoronoi {
                     }
                     let start = Clipper::corners::<V>(&frame, some_heights);
                     let polygon = clipper.cell::<V>(&start, some_heights, 0, tolerance);
-                    if polygon.len() >= 3 {
+                    if polygon.len() >= 3 && heights.owns::<V>(polygon, owner, tolerance) {
                         polygons.push_renamed(owner, polygon, rivals);
                     }
                 }
@@ -480,7 +480,7 @@ impl RestrictedVoronoi {
                         }
                     }
                     let polygon = exact.cell(&frame, duals, owner, rivals);
-                    if polygon.len() >= 3 {
+                    if polygon.len() >= 3 && (few || heights.owns::<V>(polygon, owner, tolerance)) {
                         polygons.push(owner, polygon);
                     }
                 }

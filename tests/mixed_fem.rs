@@ -189,7 +189,12 @@ fn the_stabilised_system_converges_where_others_do_not() {
 #[test]
 fn singular_configurations_are_found_and_named() {
     // Nullities that the independent program measured.
-    for (family, nullity) in [("regular", 8.0), ("union-jack", 8.0), ("criss-cross", 4.0)] {
+    // Neighbourhoods alone do not show that of the criss-cross mesh.
+    for (family, nullity, bound) in [
+        ("regular", 8.0, 8.0),
+        ("union-jack", 8.0, 8.0),
+        ("criss-cross", 4.0, 0.0),
+    ] {
         let settings = json!({ "equation": "triharmonic", "condition": "curve", "curve": "unstabilised" });
         let failure = run(
             generated("square", json!({ "family": family, "cells": 4 })),
@@ -197,12 +202,13 @@ fn singular_configurations_are_found_and_named() {
         )
         .expect_err("a singular system");
         assert_eq!(failure.kind, "singular");
-        assert!(failure.reason.contains("Proposition 2"), "{}", failure.reason);
+        let named = failure.reason.contains("Proposition 2") && failure.reason.contains("meet no free vertex but");
+        assert!(named || bound == 0.0, "{}", failure.reason);
         let mut settings = settings;
         settings["on_singular"] = json!("continue");
         settings["system"] = json!("mixed");
         let outcome = run(generated("square", json!({ "family": family, "cells": 4 })), settings).expect("an outcome");
-        assert_eq!(outcome.metrics["nullity_bound"], nullity, "{family}");
+        assert_eq!(outcome.metrics["nullity_bound"], bound, "{family}");
         assert_eq!(outcome.metrics["nullity"], nullity, "{family}");
     }
 }

@@ -1,9 +1,12 @@
 //! One test binary; a file a property.
 
+mod catmull_clark;
+mod closest_point;
 mod commands;
 mod connectivity;
 mod damaged_files;
 mod distortion;
+mod element_functions;
 mod energies;
 mod experiment_files;
 mod floors;
@@ -20,10 +23,13 @@ mod page;
 mod plan;
 mod rates;
 mod reports;
+mod restricted_voronoi;
 mod runner;
 mod sample;
 mod sparse;
+mod squared_distance;
 mod store;
+mod surface_fit;
 mod tiny_method;
 mod volume_map;
 mod volume_map_feasibility;

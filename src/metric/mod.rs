@@ -1,5 +1,6 @@
 //! What is measured of a result: each metric has a name, a unit, a floor, a better direction and a definition.
 
+pub mod distance;
 pub mod distortion;
 pub mod scaled_jacobian;
 
@@ -29,9 +30,10 @@ pub struct Metric {
 }
 
 /// Every family of metrics of this floor; methods name those that they report and add their own.
-pub fn families() -> [(&'static str, &'static [Metric]); 2] {
+pub fn families() -> [(&'static str, &'static [Metric]); 3] {
     [
         ("distortion", distortion::METRICS),
         ("scaled-jacobian", scaled_jacobian::METRICS),
+        ("distance", distance::METRICS),
     ]
 }

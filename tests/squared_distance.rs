@@ -1,0 +1,311 @@
+//! Voronoi squared distance terms: stored reference values, derivatives, invariance, one result for any number of threads.
+
+use serde_json::Value;
+use vargeo::geometry::point_tree::PointTree;
+use vargeo::geometry::restricted_voronoi::Compatibility;
+use vargeo::geometry::squared_distance::{Anisotropy, Derivative, Options, SquaredDistance, Wanted};
+
+fn vectors(value: &Value) -> Vec<[f64; 3]> {
+    serde_json::from_value(value.clone()).expect("an array of points")
+}
+
+fn cells(value: &Value) -> Vec<[u32; 3]> {
+    serde_json::from_value(value.clone()).expect("an array of triangles")
+}
+
+fn norm(x: &[[f64; 3]]) -> f64 {
+    x.iter().flatten().map(|x| x * x).sum::<f64>().sqrt()
+}
+
+fn difference(x: &[[f64; 3]], y: &[[f64; 3]]) -> f64 {
+    x.iter()
+        .flatten()
+        .zip(y.iter().flatten())
+        .map(|(x, y)| (x - y) * (x - y))
+        .sum::<f64>()
+        .sqrt()
+}
+
+fn unit(x: [f64; 3]) -> [f64; 3] {
+    let length = x.iter().map(|x| x * x).sum::<f64>().sqrt();
+    x.map(|x| x / length)
+}
+
+/// Two noisy spheres, the template and the target, with samples of the target and their normals.
+struct Sample {
+    template: (Vec<[f64; 3]>, Vec<[u32; 3]>),
+    target: (Vec<[f64; 3]>, Vec<[u32; 3]>),
+    samples: Vec<[f64; 3]>,
+    normals: Vec<[f64; 3]>,
+    results: Value,
+}
+
+fn sample() -> Sample {
+    let file: Value = serde_json::from_str(include_str!("golden/voronoi_squared_distance.json")).expect("valid JSON");
+    Sample {
+        template: (vectors(&file["S_V"]), cells(&file["S_F"])),
+        target: (vectors(&file["T_V"]), cells(&file["T_F"])),
+        samples: vectors(&file["Y"]),
+        normals: vectors(&file["N_unnormalised"]).into_iter().map(unit).collect(),
+        results: file["results"].clone(),
+    }
+}
+
+/// Values and gradients of an independent program.
+#[test]
+fn reference_values() {
+    let sample = sample();
+    let mut to_target = SquaredDistance::new(&sample.template.0, &sample.template.1).expect("a valid surface");
+    let mut to_template = SquaredDistance::new(&sample.target.0, &sample.target.1).expect("a valid surface");
+    let samples = PointTree::new(&sample.samples);
+    let vertices = PointTree::new(&sample.template.0);
+    let mut gradient = vec![[0.0; 3]; sample.template.0.len()];
+    for (name, s) in [("1.0", 1.0), ("5.0", 5.0), ("50.0", 50.0)] {
+        let expected = &sample.results[name];
+        let check = |what: &str, value: f64, gradient: &[[f64; 3]]| {
+            let reference = expected[format!("F_{what}")].as_f64().expect("a number");
+            assert!(
+                (value - reference).abs() < 1e-11 * reference,
+                "{what}, s = {s}: {value} and {reference}"
+            );
+            let reference = vectors(&expected[format!("grad_{what}")]);
+            let error = difference(gradient, &reference) / norm(&reference);
+            assert!(error < 1e-10, "{what}, s = {s}: gradient off by {error:.1e}");
+        };
+        let options = Options {
+            anisotropy: Anisotropy::Sites(s, &sample.normals),
+            ..Options::default()
+        };
+        let wanted = Wanted {
+            surface: Some(&mut gradient),
+            ..Wanted::default()
+        };
+        let value = to_target.evaluate(&sample.template.0, &samples, &options, wanted);
+        check("S_to_T", value, &gradient);
+        let options = Options {
+            anisotropy: Anisotropy::Facets(s),
+            ..Options::default()
+        };
+        let wanted = Wanted {
+            sites: Some(&mut gradient),
+            ..Wanted::default()
+        };
+        let value = to_template.evaluate(&sample.target.0, &vertices, &options, wanted);
+        check("T_to_S", value, &gradient);
+    }
+}
+
+/// Deterministic numbers in (-1, 1).
+fn noise(count: usize, seed: u64) -> Vec<[f64; 3]> {
+    let mut state = seed;
+    let mut next = || {
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (state >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+    };
+    (0..count).map(|_| std::array::from_fn(|_| next())).collect()
+}
+
+/// Every derivative, with every option, against central differences of the value.
+#[test]
+fn derivatives() {
+    let sample = sample();
+    let (points, cells) = &sample.template;
+    let mut term = SquaredDistance::new(points, cells).expect("a valid surface");
+    let sites = &sample.samples;
+    let normals: Vec<[f64; 3]> = noise(sites.len(), 5)
+        .iter()
+        .zip(&sample.normals)
+        .map(|(noise, normal)| unit(std::array::from_fn(|k| normal[k] + 0.3 * noise[k])))
+        .collect();
+    let moves = [noise(points.len(), 1), noise(sites.len(), 2), noise(sites.len(), 3)];
+    let shifted = |x: &[[f64; 3]], direction: &[[f64; 3]], t: f64| -> Vec<[f64; 3]> {
+        x.iter()
+            .zip(direction)
+            .map(|(x, d)| std::array::from_fn(|k| x[k] + t * d[k]))
+            .collect()
+    };
+    for s in [1.0, 5.0, 50.0] {
+        for weight in [0.0, 0.2] {
+            for facets in [false, true] {
+                let mut evaluate = |points: &[[f64; 3]], sites: &[[f64; 3]], normals: &[[f64; 3]], wanted: Wanted| {
+                    let options = Options {
+                        anisotropy: if facets {
+                            Anisotropy::Facets(s)
+                        } else {
+                            Anisotropy::Sites(s, normals)
+                        },
+                        compatibility: (weight > 0.0).then_some(Compatibility { weight, normals }),
+                        derivative: Derivative::Complete,
+                    };
+                    term.evaluate(points, &PointTree::new(sites), &options, wanted)
+                };
+                let mut gradients = [
+                    vec![[0.0; 3]; points.len()],
+                    vec![[0.0; 3]; sites.len()],
+                    vec![[0.0; 3]; sites.len()],
+                ];
+                let [by_points, by_sites, by_normals] = &mut gradients;
+                let wanted = Wanted {
+                    surface: Some(by_points),
+                    sites: Some(by_sites),
+                    normals: Some(by_normals),
+                    ..Wanted::default()
+                };
+                evaluate(points, sites, &normals, wanted);
+                for (which, gradient) in gradients.iter().enumerate() {
+                    let slope: f64 = gradient
+                        .iter()
+                        .flatten()
+                        .zip(moves[which].iter().flatten())
+                        .map(|(a, b)| a * b)
+                        .sum();
+                    let mut at = |t: f64| match which {
+                        0 => evaluate(&shifted(points, &moves[0], t), sites, &normals, Wanted::default()),
+                        1 => evaluate(points, &shifted(sites, &moves[1], t), &normals, Wanted::default()),
+                        _ => evaluate(points, sites, &shifted(&normals, &moves[2], t), Wanted::default()),
+                    };
+                    let step = 1e-5;
+                    let measured = (at(step) - at(-step)) / (2.0 * step);
+                    let error = (slope - measured).abs() / norm(gradient).max(1e-3);
+                    assert!(
+                        error < 1e-6,
+                        "s = {s}, compatibility {weight}, facets {facets}, gradient {which}: {slope} and {measured}"
+                    );
+                }
+            }
+        }
+    }
+}
+
+/// A bumpy torus.
+fn torus(n: usize, m: usize) -> (Vec<[f64; 3]>, Vec<[u32; 3]>) {
+    let (mut points, mut cells) = (Vec::new(), Vec::new());
+    let noise = noise(n * m, 9);
+    let at = |i: usize, j: usize| ((i % n) * m + j % m) as u32;
+    for i in 0..n {
+        for j in 0..m {
+            let (a, b) = (
+                i as f64 / n as f64 * std::f64::consts::TAU,
+                j as f64 / m as f64 * std::f64::consts::TAU,
+            );
+            let radius = 0.4 + 0.01 * noise[i * m + j][0];
+            points.push([
+                (1.0 + radius * b.cos()) * a.cos(),
+                (1.0 + radius * b.cos()) * a.sin(),
+                radius * b.sin(),
+            ]);
+            cells.push([at(i, j), at(i + 1, j), at(i + 1, j + 1)]);
+            cells.push([at(i, j), at(i + 1, j + 1), at(i, j + 1)]);
+        }
+    }
+    (points, cells)
+}
+
+#[test]
+fn same_bits_for_any_number_of_threads() {
+    let (points, cells) = torus(60, 30);
+    let sites: Vec<[f64; 3]> = points
+        .iter()
+        .step_by(3)
+        .zip(noise(600, 4))
+        .map(|(x, d)| std::array::from_fn(|k| x[k] + 0.03 * d[k]))
+        .collect();
+    let normals: Vec<[f64; 3]> = noise(sites.len(), 6).into_iter().map(unit).collect();
+    let run = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .expect("threads");
+        pool.install(|| {
+            let mut term = SquaredDistance::new(&points, &cells).expect("a valid surface");
+            let mut surface = vec![[0.0; 3]; points.len()];
+            let mut by_sites = vec![[0.0; 3]; sites.len()];
+            let mut areas = vec![0.0; sites.len()];
+            let options = Options {
+                anisotropy: Anisotropy::Sites(7.0, &normals),
+                compatibility: Some(Compatibility {
+                    weight: 0.01,
+                    normals: &normals,
+                }),
+                derivative: Derivative::Complete,
+            };
+            let wanted = Wanted {
+                surface: Some(&mut surface),
+                sites: Some(&mut by_sites),
+                areas: Some(&mut areas),
+                ..Wanted::default()
+            };
+            let value = term.evaluate(&points, &PointTree::new(&sites), &options, wanted);
+            let numbers = surface
+                .iter()
+                .flatten()
+                .chain(by_sites.iter().flatten())
+                .chain(&areas)
+                .chain([&value]);
+            numbers.map(|x| x.to_bits()).collect::<Vec<_>>()
+        })
+    };
+    let one = run(1);
+    assert_eq!(one, run(2));
+    assert_eq!(one, run(4));
+}
+
+/// Moving the surface and the sites together changes nothing: values agree, gradients turn along.
+#[test]
+fn rigid_motions() {
+    let (points, cells) = torus(30, 15);
+    let sites: Vec<[f64; 3]> = points.iter().step_by(4).copied().collect();
+    let turn = |x: [f64; 3]| {
+        let (s, c) = 0.7f64.sin_cos();
+        let [x, y, z] = [c * x[0] - s * x[1], s * x[0] + c * x[1], x[2]];
+        [x, c * y - s * z, s * y + c * z]
+    };
+    let moved = |x: &[[f64; 3]]| -> Vec<[f64; 3]> {
+        x.iter()
+            .map(|&x| {
+                let y = turn(x);
+                [y[0] + 3.0, y[1] - 1.0, y[2] + 0.5]
+            })
+            .collect()
+    };
+    let evaluate = |points: &[[f64; 3]], sites: &[[f64; 3]]| {
+        let mut term = SquaredDistance::new(points, &cells).expect("a valid surface");
+        let mut gradient = vec![[0.0; 3]; sites.len()];
+        let mut areas = vec![0.0; sites.len()];
+        let options = Options {
+            anisotropy: Anisotropy::Facets(50.0),
+            ..Options::default()
+        };
+        let wanted = Wanted {
+            sites: Some(&mut gradient),
+            areas: Some(&mut areas),
+            ..Wanted::default()
+        };
+        let value = term.evaluate(points, &PointTree::new(sites), &options, wanted);
+        (value, gradient, areas.iter().sum::<f64>())
+    };
+    let (value, gradient, area) = evaluate(&points, &sites);
+    let (other, turned, same) = evaluate(&moved(&points), &moved(&sites));
+    assert!((value - other).abs() < 1e-12 * value, "{value} and {other}");
+    assert!((area - same).abs() < 1e-12 * area);
+    let expected: Vec<[f64; 3]> = gradient.iter().map(|&x| turn(x)).collect();
+    assert!(difference(&turned, &expected) < 1e-9 * norm(&gradient));
+}
+
+/// Steps that leave the world behind: an infinite value, which a line search takes for too long a step.
+#[test]
+fn values_beyond_measure() {
+    let (points, cells) = torus(6, 5);
+    let mut term = SquaredDistance::new(&points, &cells).expect("a valid surface");
+    let mut value = |points: &[[f64; 3]], sites: &[[f64; 3]]| {
+        term.evaluate(points, &PointTree::new(sites), &Options::default(), Wanted::default())
+    };
+    assert!(value(&points, &points).is_finite());
+    assert_eq!(value(&points, &[]), f64::INFINITY);
+    assert_eq!(value(&points, &[[f64::NAN; 3]]), f64::INFINITY);
+    let mut broken = points.clone();
+    broken[3][1] = f64::NEG_INFINITY;
+    assert_eq!(value(&broken, &points), f64::INFINITY);
+}

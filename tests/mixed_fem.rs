@@ -5,7 +5,6 @@ use vargeo::fem::surface::SurfaceOperators;
 use vargeo::mesh::format;
 use vargeo::mesh::planar::{self, Domain, FAMILIES, Family};
 use vargeo::method::mixed_fem::MixedFem;
-use vargeo::method::mixed_fem::settings::Settings;
 use vargeo::method::model::{LoadedModel, Part};
 use vargeo::method::{Failure, Inputs, Method, Outcome};
 use vargeo::optimize::Silent;
@@ -184,6 +183,25 @@ fn the_stabilised_system_converges_where_others_do_not() {
     // 2.00 and 0.16 by the independent program.
     assert!((rate("regular", &region) - 2.0).abs() < 0.05);
     assert!(rate("centroid-split", &region) < 0.3);
+}
+
+#[test]
+fn symmetric_pivots_hold_for_the_mixed_systems_of_larger_meshes() {
+    for (family, condition) in [
+        ("regular", "region"),
+        ("regular", "curve"),
+        ("minimum-angle-30", "curve"),
+    ] {
+        for equation in ["biharmonic", "triharmonic"] {
+            let settings = json!({
+                "equation": equation, "condition": condition, "system": "mixed", "solver": "lblt", "compare": true,
+            });
+            let outcome = run(generated("square", json!({ "family": family, "cells": 32 })), settings)
+                .unwrap_or_else(|failure| panic!("{family}, {condition}, {equation}: {}", failure.reason));
+            let difference = outcome.metrics["difference"];
+            assert!(difference < 1e-6, "{family}, {condition}, {equation}: {difference:e}");
+        }
+    }
 }
 
 #[test]

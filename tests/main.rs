@@ -21,6 +21,7 @@ mod page;
 mod plan;
 mod rates;
 mod reports;
+mod restricted_voronoi;
 mod runner;
 mod sample;
 mod sparse;

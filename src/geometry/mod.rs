@@ -5,3 +5,4 @@ pub mod hilbert;
 pub mod point_tree;
 pub mod restricted_voronoi;
 pub mod squared_distance;
+pub mod centroidal_voronoi;

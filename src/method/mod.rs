@@ -7,6 +7,7 @@ pub mod setting;
 pub mod model;
 pub mod surface_fit;
 pub mod volume_map;
+pub mod centroidal_voronoi;
 
 use crate::metric::Metric;
 use crate::optimize::Observer;
@@ -77,6 +78,11 @@ pub trait Method: Sync {
     }
     /// The metrics that every record of this method holds.
     fn metrics(&self) -> &'static [Metric];
+    /// Settings and axes across which values of this metric mean different things, such as energies of different
+    /// densities: no table calls one of them the best.
+    fn incomparable(&self, _metric: &str) -> &'static [&'static str] {
+        &[]
+    }
     /// Names and meanings of the columns in [`Outcome::traces`], such as `iteration` and `energy`.
     fn traces(&self) -> &'static [(&'static str, &'static str)] {
         &[]
@@ -90,7 +96,11 @@ pub trait Method: Sync {
 
 /// Every method, in the order of the documentation.
 pub fn methods() -> &'static [&'static dyn Method] {
-    &[&volume_map::VolumeMap, &surface_fit::SurfaceFit]
+    &[
+        &volume_map::VolumeMap,
+        &surface_fit::SurfaceFit,
+        &centroidal_voronoi::CentroidalVoronoi,
+    ]
 }
 
 /// The method of this name.

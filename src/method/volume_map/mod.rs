@@ -52,7 +52,7 @@ impl Method for VolumeMap {
     }
 
     fn version(&self) -> u32 {
-        1
+        4
     }
 
     fn summary(&self) -> &'static str {
@@ -85,6 +85,14 @@ impl Method for VolumeMap {
 
     fn metrics(&self) -> &'static [Metric] {
         metrics::all()
+    }
+
+    fn incomparable(&self, metric: &str) -> &'static [&'static str] {
+        match metric {
+            "energy" => &["energy", "weighting", "rescale", "model"],
+            "energy_integral" => &["energy", "rescale", "model"],
+            _ => &[],
+        }
     }
 
     fn traces(&self) -> &'static [(&'static str, &'static str)] {
@@ -223,6 +231,10 @@ pub fn run(problem: &Problem, settings: &Settings, observer: &mut dyn Observer) 
         counters.set("approach_iterations", solution.counters.iterations);
         counters.add("factorizations", solution.counters.factorizations);
         counters.add("evaluations", solution.counters.evaluations);
+        if matches!(solution.stop, StopReason::TimeLimit | StopReason::Cancelled) {
+            let end = (solution.stop, "stopped from outside during the approach".to_string());
+            return finish(problem, settings, &positions, end, trace, counters, notices, observer);
+        }
         notices.push(format!(
             "the energy of the start is beyond all measure, so \"{}\" was minimized first, in {} iterations",
             Mips.name(),
@@ -268,6 +280,7 @@ pub fn run(problem: &Problem, settings: &Settings, observer: &mut dyn Observer) 
             positions = relaxed.positions;
             counters.set("iterations", relaxed.iterations);
             counters.set("relaxations", relaxed.relaxations);
+            counters.set("relaxation_iterations", relaxed.relaxation_iterations);
             counters.set("weights", relaxed.weights.len() as u64);
             counters.add("evaluations", relaxed.evaluations);
             (relaxed.stop, relaxed.reason)
@@ -352,6 +365,10 @@ pub const COUNTERS: &[(&str, &str)] = &[
         "Newton iterations on another energy, where the chosen one overflows on the start",
     ),
     ("relaxations", "relaxations of the relaxed-newton solver"),
+    (
+        "relaxation_iterations",
+        "accepted steps within these relaxations, counted apart from the iterations",
+    ),
     (
         "weights",
         "weights that the relaxed-newton solver minimized with, one after the other",

@@ -674,8 +674,18 @@ impl Settings {
         if start != Start::RandomInterior {
             drop(&["seed"]);
         }
-        if !self.untangle {
+        // Only a density that is infinite on inverted tetrahedra asks for a start without any.
+        let upright = self.with_barrier()
+            || self.weighting == Weighting::Target
+            || self.density().is_ok_and(|energy| energy.is_barrier());
+        if !upright {
+            drop(&["untangle"]);
+        }
+        if !upright || !self.untangle {
             drop(&["untangling"]);
+        }
+        if !upright || !self.solver.hard_constraints() {
+            drop(&["on_infeasible"]);
         }
         for (solver, name) in [
             (Solver::ProjectedNewton, "projected-newton"),
@@ -689,6 +699,17 @@ impl Settings {
         }
         if !self.solver.hard_constraints() {
             drop(&["energy_tolerance", "change_tolerance"]);
+        }
+        if let Some(Value::Object(options)) = table.get_mut("relaxed-newton") {
+            let without_effect: &[&str] = match self.relaxed_newton.continuation {
+                Continuation::Off => &["continuation_weight", "continuation_factor", "continuation_rounds"],
+                Continuation::On => &["weight"],
+                Continuation::Auto => &[],
+            };
+            without_effect.iter().for_each(|name| drop_entry(options, name));
+            if !self.relaxed_newton.relaxation {
+                drop_entry(options, "relaxation_steps");
+            }
         }
         // Written with the words they stand for, so that `auto` and its meaning share a key.
         let barrier = if self.with_barrier() {

@@ -1,4 +1,5 @@
-//! Meshes in flat arrays: triangle surfaces and tetrahedral volumes, their connectivity, generators, readers and writers.
+//! Meshes in flat arrays: triangle and quadrilateral surfaces, tetrahedral and mixed volumes, their connectivity, generators,
+//! readers and writers.
 //!
 //! Nothing here opens a file: readers take bytes, writers take `std::io::Write`.
 
@@ -6,12 +7,17 @@ pub mod connectivity;
 pub mod quality;
 pub mod split;
 pub mod check;
+pub mod quadrilateral;
+pub mod mixed;
 pub mod summary;
 pub mod linear_map;
 pub mod surface;
 pub mod catmull_clark;
 pub mod generate;
+pub mod planar;
+pub mod band;
 pub mod target;
+pub mod template;
 pub mod format;
 
 /// A mesh of cells with `N` vertices each: `points` in model units, `cells` as indices into `points`.
@@ -43,6 +49,11 @@ pub(crate) fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
         a[2] * b[0] - a[0] * b[2],
         a[0] * b[1] - a[1] * b[0],
     ]
+}
+
+/// `a + factor b`.
+pub(crate) fn add_scaled(a: [f64; 3], b: [f64; 3], factor: f64) -> [f64; 3] {
+    [a[0] + factor * b[0], a[1] + factor * b[1], a[2] + factor * b[2]]
 }
 
 /// The Euclidean length.

@@ -5,9 +5,12 @@
 
 pub mod setting;
 pub mod model;
-pub mod surface_fit;
 pub mod volume_map;
+pub mod volume_fit;
+pub mod surface_fit;
 pub mod centroidal_voronoi;
+pub mod g1_surface;
+pub mod mixed_fem;
 
 use crate::metric::Metric;
 use crate::optimize::Observer;
@@ -98,8 +101,11 @@ pub trait Method: Sync {
 pub fn methods() -> &'static [&'static dyn Method] {
     &[
         &volume_map::VolumeMap,
+        &volume_fit::VolumeFit,
         &surface_fit::SurfaceFit,
         &centroidal_voronoi::CentroidalVoronoi,
+        &g1_surface::G1Surface,
+        &mixed_fem::MixedFem,
     ]
 }
 

@@ -90,7 +90,14 @@ impl Lbfgs {
             if let Some(reason) = before.and_then(|before| self.stopping.change(before, value)) {
                 break (StopReason::Converged, reason);
             }
-            two_loops(&pairs, &gradient, &mut direction, &mut coefficients);
+            two_loops(
+                objective,
+                &pairs,
+                &gradient,
+                &mut direction,
+                &mut coefficients,
+                &mut ahead,
+            );
             let slope = dot(&gradient, &direction);
             if slope < 0.0
                 && let Some(reason) = self.stopping.decrement(slope, value)
@@ -107,7 +114,7 @@ impl Lbfgs {
                 );
             }
             // Without memory the direction has no natural length: start with a unit step in space.
-            let length = if pairs.is_empty() {
+            let length = if pairs.is_empty() && !objective.is_preconditioned() {
                 (1.0 / gradient_norm).min(1.0)
             } else {
                 1.0
@@ -175,7 +182,14 @@ impl Lbfgs {
 }
 
 /// `direction = -H gradient` with the inverse Hessian `H` that the remembered steps stand for.
-fn two_loops(pairs: &VecDeque<Pair>, gradient: &[f64], direction: &mut [f64], coefficients: &mut [f64]) {
+fn two_loops(
+    objective: &mut (impl Objective + ?Sized),
+    pairs: &VecDeque<Pair>,
+    gradient: &[f64],
+    direction: &mut [f64],
+    coefficients: &mut [f64],
+    room: &mut [f64],
+) {
     for (direction, gradient) in direction.iter_mut().zip(gradient) {
         *direction = -gradient;
     }
@@ -185,8 +199,20 @@ fn two_loops(pairs: &VecDeque<Pair>, gradient: &[f64], direction: &mut [f64], co
             *direction -= *coefficient * change;
         }
     }
+    let mut scale = 1.0;
+    let preconditioned = objective.is_preconditioned();
     if let Some(last) = pairs.back() {
-        let scale = 1.0 / (last.inverse * dot(&last.gradient, &last.gradient));
+        // The curvature along the last step as the model without memory sees it.
+        room.copy_from_slice(&last.gradient);
+        if preconditioned {
+            objective.precondition(room);
+        }
+        scale = 1.0 / (last.inverse * dot(&last.gradient, room));
+    }
+    if preconditioned {
+        objective.precondition(direction);
+    }
+    if scale != 1.0 {
         for direction in direction.iter_mut() {
             *direction *= scale;
         }

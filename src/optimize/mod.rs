@@ -75,6 +75,12 @@ pub trait Objective {
     fn max_step(&mut self, _x: &[f64], _direction: &[f64]) -> f64 {
         f64::INFINITY
     }
+    /// Whether [`Objective::precondition`] does anything.
+    fn is_preconditioned(&self) -> bool {
+        false
+    }
+    /// Multiplies by the inverse of a constant positive definite model of the Hessian, which L-BFGS starts its own from.
+    fn precondition(&mut self, _vector: &mut [f64]) {}
 }
 
 /// A function with a positive definite model of its Hessian.

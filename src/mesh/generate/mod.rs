@@ -12,6 +12,7 @@ pub mod cube;
 pub mod ellipsoid;
 pub mod shape;
 pub mod star;
+pub mod surface;
 pub mod template;
 pub mod twisted_grid;
 

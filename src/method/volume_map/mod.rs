@@ -10,6 +10,7 @@
 //! outcome says which tetrahedra stay inverted.
 
 pub mod feasibility;
+pub mod fields;
 pub mod harmonic;
 pub mod l_bfgs;
 pub mod locally_injective;
@@ -68,7 +69,7 @@ impl Method for VolumeMap {
     }
 
     fn settings(&self) -> &'static [Field] {
-        settings::FIELDS
+        fields::FIELDS
     }
 
     fn check(&self, settings: &Value) -> Vec<(String, String)> {

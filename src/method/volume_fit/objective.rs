@@ -1,0 +1,79 @@
+//! What a fit minimizes: `E = E_S + lambda E_Omega` over the nodes (Jin et al. 2013, equation 1).
+
+use super::preconditioner::Preconditioner;
+use super::surface_energy::SurfaceEnergy;
+use crate::fem::boundary::Boundary;
+use crate::fem::volume_energy::VolumeEnergy;
+use crate::optimize::Objective;
+use std::cell::Cell;
+use std::rc::Rc;
+
+/// The parts of the energy at the last point that was evaluated.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Parts {
+    pub surface: f64,
+    pub volume: f64,
+    pub least_determinant: f64,
+}
+
+/// The energy of one stage.
+pub struct FitObjective<'a> {
+    pub volume: &'a VolumeEnergy,
+    pub boundary: &'a Boundary,
+    pub surface: Option<&'a mut SurfaceEnergy>,
+    pub lambda: f64,
+    pub preconditioner: Option<Preconditioner>,
+    pub latest: Rc<Cell<Parts>>,
+    pub samples: Vec<[f64; 3]>,
+    pub forces: Vec<[f64; 3]>,
+    pub room: Vec<f64>,
+}
+
+impl Objective for FitObjective<'_> {
+    fn dimension(&self) -> usize {
+        3 * self.volume.nodes()
+    }
+
+    fn value(&mut self, x: &[f64]) -> f64 {
+        let mut gradient = std::mem::take(&mut self.room);
+        gradient.resize(x.len(), 0.0);
+        let value = self.gradient(x, &mut gradient);
+        self.room = gradient;
+        value
+    }
+
+    fn gradient(&mut self, x: &[f64], gradient: &mut [f64]) -> f64 {
+        gradient.fill(0.0);
+        let volume = self.volume.add_gradient(x, self.lambda, gradient);
+        if !volume.value.is_finite() {
+            // The surface does not matter where a cell is inverted.
+            return f64::INFINITY;
+        }
+        let mut parts = Parts {
+            surface: 0.0,
+            volume: volume.value,
+            least_determinant: volume.least_determinant,
+        };
+        if let Some(surface) = &mut self.surface {
+            self.boundary.positions(x, &mut self.samples);
+            self.forces.resize(self.samples.len(), [0.0; 3]);
+            parts.surface = surface.gradient(&self.samples, &mut self.forces);
+            if !parts.surface.is_finite() {
+                return f64::INFINITY;
+            }
+            self.boundary.add_gradient(&self.forces, gradient);
+        }
+        self.latest.set(parts);
+        parts.surface + self.lambda * parts.volume
+    }
+
+    fn is_preconditioned(&self) -> bool {
+        self.preconditioner.is_some()
+    }
+
+    fn precondition(&mut self, vector: &mut [f64]) {
+        if let Some(preconditioner) = &mut self.preconditioner {
+            preconditioner.apply(vector);
+        }
+    }
+}

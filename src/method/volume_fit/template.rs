@@ -1,0 +1,151 @@
+//! The template: read or generated, shaped by its recipe, laid into the target.
+
+use super::target::Target;
+use crate::mesh::format;
+use crate::mesh::mixed::MixedMesh;
+use crate::mesh::template::{carve, collapse, extrude, grid, pillow, voxels};
+use crate::mesh::{bounding_box, diagonal, generate};
+use crate::method::Failure;
+use crate::method::model::Part;
+use serde_json::Value;
+
+fn invalid(reason: String) -> Failure {
+    Failure {
+        kind: "invalid-input".to_string(),
+        reason: format!("template: {reason}"),
+    }
+}
+
+/// Most cells of a generated template.
+const MOST_CELLS: usize = 4_000_000;
+
+/// Reads or generates the template and follows its recipe.
+///
+/// # Errors
+/// `invalid-input` for a file that holds no volume, a recipe that cannot be followed, or a mesh that is not valid.
+pub fn read(part: &Part, target: Option<&Target>, notices: &mut Vec<String>) -> Result<MixedMesh, Failure> {
+    let (mut mesh, parameters, generated) = match part {
+        Part::Generated { generator, parameters } => {
+            let count =
+                |name: &str, default: u64| parameters.get(name).and_then(Value::as_u64).unwrap_or(default) as usize;
+            let mesh = match generator.as_str() {
+                "grid" => {
+                    let counts = [count("x", 4), count("y", 4), count("z", 4)];
+                    if counts.iter().product::<usize>() > MOST_CELLS {
+                        return Err(invalid(format!(
+                            "a grid of {counts:?} has more than {MOST_CELLS} cells"
+                        )));
+                    }
+                    grid::grid(counts)
+                }
+                "voxels" => {
+                    let Some(target) = target.filter(|target| !target.surface.cells.is_empty()) else {
+                        return Err(invalid(
+                            "voxels need a target surface; give one, or generate a grid".to_string(),
+                        ));
+                    };
+                    voxels::voxels(&target.surface, count("along", 8)).map_err(invalid)?
+                }
+                name => {
+                    let mut table = parameters.clone();
+                    if let Some(table) = table.as_object_mut() {
+                        table.remove("recipe");
+                        table.remove("place");
+                    }
+                    let generated = generate::generate(name, &table).map_err(invalid)?;
+                    MixedMesh {
+                        points: generated.mesh.points,
+                        tetrahedra: generated.mesh.cells,
+                        ..MixedMesh::default()
+                    }
+                }
+            };
+            (mesh, parameters, generator != "voxels")
+        }
+        Part::File {
+            name,
+            bytes,
+            parameters,
+        } => {
+            let content = format::read(name, bytes).map_err(|error| invalid(error.to_string()))?;
+            notices.extend(content.notices.iter().map(|notice| format!("template: {notice}")));
+            let (mut mesh, found) = MixedMesh::from_content(&content).map_err(invalid)?;
+            notices.extend(found.into_iter().map(|notice| format!("template: {notice}")));
+            let scale = parameters.get("scale").and_then(Value::as_f64).unwrap_or(1.0);
+            for point in &mut mesh.points {
+                *point = point.map(|coordinate| coordinate * scale);
+            }
+            (mesh, parameters, false)
+        }
+    };
+    let recipe = parameters.get("recipe").and_then(Value::as_array);
+    for (step, operation) in recipe.into_iter().flatten().enumerate() {
+        mesh = apply(&mesh, operation).map_err(|reason| invalid(format!("step {step} of the recipe: {reason}")))?;
+    }
+    mesh.topology().map_err(invalid)?;
+    let place = parameters.get("place").and_then(Value::as_str);
+    if let Some(target) = target {
+        lay(
+            &mut mesh,
+            target,
+            place.unwrap_or(if generated { "box" } else { "none" }),
+        )
+        .map_err(invalid)?;
+    }
+    Ok(mesh)
+}
+
+/// One operation of a recipe.
+fn apply(mesh: &MixedMesh, operation: &Value) -> Result<MixedMesh, String> {
+    let corner = |name: &str, missing: f64| -> Result<[f64; 3], String> {
+        let Some(list) = operation.get(name).and_then(Value::as_array) else {
+            return Ok([missing; 3]);
+        };
+        let numbers: Vec<f64> = list.iter().filter_map(Value::as_f64).collect();
+        <[f64; 3]>::try_from(numbers).map_err(|_| format!("`{name}` needs three numbers, [x, y, z]"))
+    };
+    let number = |name: &str, default: f64| operation.get(name).and_then(Value::as_f64).unwrap_or(default);
+    let region = [corner("from", f64::NEG_INFINITY)?, corner("to", f64::INFINITY)?];
+    let boxed = operation.get("from").is_some() || operation.get("to").is_some();
+    match operation.get("op").and_then(Value::as_str).unwrap_or_default() {
+        "carve" if !boxed => Err("carving needs a box: give `from` and `to`".to_string()),
+        "carve" => carve::carve(mesh, region),
+        "extrude" => extrude::extrude(mesh, region, number("distance", 1.0), number("layers", 1.0) as usize),
+        "pillow" => pillow::pillow(mesh, number("thickness", 0.4)),
+        "collapse" => {
+            let axis = match operation.get("axis").and_then(Value::as_str) {
+                Some("y") => 1,
+                Some("z") => 2,
+                _ => 0,
+            };
+            collapse::collapse(mesh, axis, region)
+        }
+        other => Err(format!("unknown operation {other:?}")),
+    }
+}
+
+/// Lays the template into the target's box.
+fn lay(mesh: &mut MixedMesh, target: &Target, place: &str) -> Result<(), String> {
+    let points = if target.surface.points.is_empty() {
+        &target.sites
+    } else {
+        &target.surface.points
+    };
+    let (Some([low, high]), Some([from, to])) = (bounding_box(points), bounding_box(&mesh.points)) else {
+        return Err("there are no points".to_string());
+    };
+    let factors: [f64; 3] = match place {
+        "box" => std::array::from_fn(|axis| (high[axis] - low[axis]) / (to[axis] - from[axis])),
+        "scale" => [diagonal(points) / diagonal(&mesh.points); 3],
+        _ => return Ok(()),
+    };
+    if !factors.iter().all(|factor| factor.is_finite() && *factor > 0.0) {
+        return Err("the target or the template is flat along an axis; use place = \"scale\" or \"none\"".to_string());
+    }
+    for point in &mut mesh.points {
+        *point = std::array::from_fn(|axis| {
+            0.5 * (low[axis] + high[axis]) + factors[axis] * (point[axis] - 0.5 * (from[axis] + to[axis]))
+        });
+    }
+    Ok(())
+}

@@ -26,5 +26,6 @@ mod sparse;
 mod squared_distance;
 mod store;
 mod tiny_method;
+mod volume_fit;
 mod volume_map;
 mod volume_map_feasibility;

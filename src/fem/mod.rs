@@ -13,3 +13,4 @@ pub mod element;
 pub mod batches;
 pub mod volume_energy;
 pub mod boundary;
+pub mod certificate;

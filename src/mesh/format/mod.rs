@@ -14,6 +14,7 @@ mod text;
 
 mod gmsh;
 mod medit;
+mod mfem;
 mod obj;
 mod off;
 mod ply;
@@ -85,6 +86,7 @@ pub struct Written {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
     Medit,
+    Mfem,
     Gmsh,
     /// Version 2.2, for programs that do not know 4.1.
     Gmsh2,
@@ -122,6 +124,16 @@ pub const FORMATS: &[Entry] = &[
         sniff: medit::sniff,
         read: medit::read,
         write: medit::write,
+    },
+    Entry {
+        format: Format::Mfem,
+        name: "MFEM",
+        extensions: &["mfem"],
+        cells: &CellKind::ALL,
+        doc: "text, straight cells; attributes are kept as the field `reference`",
+        sniff: mfem::sniff,
+        read: mfem::read,
+        write: mfem::write,
     },
     Entry {
         format: Format::Gmsh,

@@ -19,13 +19,15 @@ pub mod settings;
 pub mod surface_energy;
 pub mod target;
 pub mod template;
+pub mod untangle;
 
 use super::model::ModelKind;
 use super::setting::Field;
 use super::{Failure, Inputs, Method, Outcome, Traces};
 use crate::fem::batches::{Batches, references_of_volume};
 use crate::fem::boundary::Boundary;
-use crate::fem::space::Space;
+use crate::energy::mapping::Density;
+use crate::fem::space::{Kind, Space};
 use crate::fem::volume_energy::VolumeEnergy;
 use crate::linalg::vector3::Columns;
 use crate::mesh::mixed::{MixedMesh, Topology};
@@ -163,6 +165,8 @@ struct Fit<'a> {
     lambda: f64,
     increases: usize,
     stages: usize,
+    /// Quadrature points added a direction, after elements came out invalid between the points.
+    extra_points: usize,
 }
 
 /// Tells the world and remembers.
@@ -289,6 +293,7 @@ impl<'a> Fit<'a> {
             lambda: settings.stages[0].lambda,
             increases: 0,
             stages: 0,
+            extra_points: 0,
         })
     }
 
@@ -297,13 +302,16 @@ impl<'a> Fit<'a> {
     }
 
     fn volume_energy(&self, space: &Space) -> Result<VolumeEnergy, Failure> {
-        let quadrature = |kind: crate::fem::space::Kind| {
-            self.settings
-                .rule
-                .cell(kind.shape, self.settings.quadrature_points(kind.order))
+        self.volume_energy_of(space, Density::new(self.settings.energy))
+    }
+
+    fn volume_energy_of(&self, space: &Space, density: Density) -> Result<VolumeEnergy, Failure> {
+        let quadrature = |kind: Kind| {
+            let points = self.settings.quadrature_points(kind.order) + self.extra_points;
+            self.settings.rule.cell(kind.shape, points)
         };
         let batches = Batches::new(space, &self.references, &quadrature).map_err(invalid)?;
-        VolumeEnergy::new(batches, self.settings.energy).map_err(invalid)
+        VolumeEnergy::new(batches, density).map_err(invalid)
     }
 
     /// Intervals between samples along an edge of the boundary.
@@ -333,7 +341,18 @@ impl<'a> Fit<'a> {
         let quality = outcome::quality(&self.space, &self.references, &self.x)?;
         let inverted_at_start = quality.least_determinant.iter().filter(|det| !(**det > 0.0)).count();
         drop(start);
-        if !evaluation.value.is_finite() {
+        let mut stop = StopReason::Converged;
+        let mut reason = String::new();
+        if !evaluation.value.is_finite() && self.settings.untangle {
+            if let Some(interrupted) = untangle::untangle(self, observer)? {
+                return self.finish(
+                    interrupted,
+                    "stopped from outside while the template was untangled".to_string(),
+                    inverted_at_start,
+                    observer,
+                );
+            }
+        } else if !evaluation.value.is_finite() {
             return Err(Failure {
                 kind: "invalid-start".to_string(),
                 reason: format!(
@@ -343,8 +362,6 @@ impl<'a> Fit<'a> {
                 ),
             });
         }
-        let mut stop = StopReason::Converged;
-        let mut reason = String::new();
         let stages = self.settings.stages.clone();
         for stage in stages {
             let orders: Vec<usize> = self.space.orders.iter().map(|&order| order.max(stage.order)).collect();
@@ -369,6 +386,30 @@ impl<'a> Fit<'a> {
                     break;
                 }
             }
+        }
+        for _ in 0..self.settings.repairs {
+            if interrupted(stop) {
+                break;
+            }
+            observer.phase("certify");
+            let certificates = outcome::certify(&self.space, &self.references, &self.x, observer);
+            let failing = certificates.verdicts.iter().filter(|verdict| **verdict == outcome::Judged::Fails).count();
+            if failing == 0 {
+                break;
+            }
+            self.extra_points += 3;
+            self.notices.push(format!(
+                "{failing} elements were invalid between quadrature points; gone on with {} more a direction",
+                self.extra_points
+            ));
+            if !self.volume_energy(&self.space)?.value(&self.x).value.is_finite()
+                && let Some(interrupted) = untangle::untangle(self, observer)?
+            {
+                (stop, reason) = (interrupted, "stopped from outside during a repair".to_string());
+                break;
+            }
+            let last = self.settings.stages[self.settings.stages.len() - 1];
+            (stop, reason) = self.stage(&last, observer)?;
         }
         self.finish(stop, reason, inverted_at_start, observer)
     }
@@ -502,7 +543,7 @@ impl<'a> Fit<'a> {
         )?;
         let cells = self.volume.cells();
         let flags: Vec<bool> = quality.least_determinant.iter().map(|det| !(*det > 0.0)).collect();
-        let certificates = outcome::certify(&self.volume, &self.space, &self.references, &self.x, observer);
+        let certificates = outcome::certify(&self.space, &self.references, &self.x, observer);
         let mut set = |name: &str, value: f64| {
             metrics.insert(name.to_string(), value);
         };

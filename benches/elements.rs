@@ -36,7 +36,8 @@ fn grid(n: u32) -> MixedMesh {
         for j in 0..side {
             for i in 0..side {
                 let [x, y, z] = [i, j, k].map(|c| f64::from(c) / f64::from(n));
-                mesh.points.push([x + 0.05 * (3.0 * y).sin(), y + 0.1 * x * z, z - 0.05 * x * x]);
+                mesh.points
+                    .push([x + 0.05 * (3.0 * y).sin(), y + 0.1 * x * z, z - 0.05 * x * x]);
             }
         }
     }
@@ -54,18 +55,29 @@ fn grid(n: u32) -> MixedMesh {
 
 fn main() {
     // Rayon runs what one thread asks for on that thread when its pool is that thread.
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a pool of one thread");
-    let side = std::env::args().filter_map(|word| word.parse().ok()).next().unwrap_or(8);
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(1)
+        .build()
+        .expect("a pool of one thread");
+    let side = std::env::args()
+        .filter_map(|word| word.parse().ok())
+        .next()
+        .unwrap_or(8);
     let mesh = grid(side);
     let topology = mesh.topology().expect("a grid");
     let references = references_of_volume(mesh.iter().map(|cell| cell.0), mesh.volume());
-    println!("{:>22} {:>5} {:>9} {:>14} {:>11}", "energy", "order", "unknowns", "processor", "ns/unknown");
+    println!(
+        "{:>22} {:>5} {:>9} {:>14} {:>11}",
+        "energy", "order", "unknowns", "processor", "ns/unknown"
+    );
     pool.install(|| {
         for energy in ["hencky", "symmetric-dirichlet"] {
             for order in [2, 3, 4, 6, 8, 12] {
                 let orders = vec![order; mesh.cells()];
                 let space = Space::new(&mesh, &topology, basis::bases()[0], &orders).expect("a space");
-                let batches = Batches::new(&space, &references, &|kind| Rule::Gauss.cell(kind.shape, kind.order + 1));
+                let batches = Batches::new(&space, &references, &|kind| {
+                    Rule::Gauss.cell(kind.shape, kind.order + 1)
+                });
                 let energy_of = find(energy).expect("a listed energy");
                 let mut volume = VolumeEnergy::new(batches.expect("batches"), Density::new(energy_of)).expect("an energy");
                 let x = space.linear(&mesh.points);

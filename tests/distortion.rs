@@ -92,7 +92,7 @@ fn inverted_and_flat_tetrahedra() {
         1.0,
     )
     .unwrap();
-    assert_eq!((flat.inverted, flat.degenerate), (0, mesh.cells.len()));
+    assert_eq!((flat.inverted, flat.degenerate), (mesh.cells.len(), mesh.cells.len()));
     assert!(flat.d_ma.is_infinite() && flat.d_mv.is_nan());
     let mut one = mesh.points.clone();
     one[13] = [2.0, 0.5, 0.5];

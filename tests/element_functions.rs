@@ -16,7 +16,10 @@ struct Random(u64);
 
 impl Random {
     fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        self.0 = self
+            .0
+            .wrapping_mul(6364136223846793005)
+            .wrapping_add(1442695040888963407);
         ((self.0 >> 11) as f64) / (1u64 << 53) as f64
     }
 
@@ -156,7 +159,10 @@ fn functions_agree_with_stored_values() {
             assert!((value - values[place]).abs() < 1e-13, "{shape:?} {family} {entity}");
             for axis in 0..3 {
                 let wanted = record["grads"][place][axis].as_f64().unwrap();
-                assert!((gradient[axis] - wanted).abs() < 1e-11, "{shape:?} {family} {entity} {axis}");
+                assert!(
+                    (gradient[axis] - wanted).abs() < 1e-11,
+                    "{shape:?} {family} {entity} {axis}"
+                );
             }
         }
     }
@@ -224,7 +230,11 @@ fn neighbours_agree_on_their_face_in_every_orientation() {
                         let mut point = [0.0; 3];
                         for (place, vertex) in ring.iter().enumerate() {
                             let local = own.iter().position(|corner| corner == vertex).unwrap();
-                            let weight = if corners == 4 { bilinear[place] } else { weights[place] / sum };
+                            let weight = if corners == 4 {
+                                bilinear[place]
+                            } else {
+                                weights[place] / sum
+                            };
                             for axis in 0..3 {
                                 point[axis] += weight * shape.canonical()[local][axis];
                             }
@@ -332,7 +342,8 @@ fn mixed(random: &mut Random) -> MixedMesh {
     }
     mesh.points.push([2.9, 0.5, 0.0]);
     mesh.points.push([2.9, 0.5, 1.0]);
-    mesh.prisms.push([at(2, 0, 0), 12, at(2, 1, 0), at(2, 0, 1), 13, at(2, 1, 1)]);
+    mesh.prisms
+        .push([at(2, 0, 0), 12, at(2, 1, 0), at(2, 0, 1), 13, at(2, 1, 1)]);
     mesh.points.push([2.3, 0.5, 1.8]);
     mesh.tetrahedra.push([at(2, 0, 1), 13, at(2, 1, 1), 14]);
     for point in &mut mesh.points {

@@ -451,7 +451,7 @@ fn every_mistake_has_its_place_and_its_mend() {
         ),
         (
             "[[table]]\nname = \"a\"\nrows = [\"energy\"]\ncolumns = [\"d_ma\"]",
-            "3:9 unknown axis \"energy\" |  | known: model",
+            "3:9 unknown axis \"energy\" |  | \"energy\" is a setting that does not vary; give it values under [vary]",
         ),
         (
             "[[table]]\nname = \"a/b\"\ncolumns = [\"d_ma\"]",
@@ -534,8 +534,8 @@ fn every_mistake_has_its_place_and_its_mend() {
             "1:1 an expectation that says nothing |  | add a metric with its bound, such as inverted = 0, or stop = \"converged\"",
         ),
         (
-            "[vary]\nenergy = [\"arap\", \"stretch\"]\n[[expect]]\nd_ma = { less_than = { energy = \"arap\" } }",
-            "4:22 the job with model = ball, energy = arap has no other to be compared with | expected axis values that another job has, all else equal | narrow the expectation with \"where\"",
+            "[vary]\nenergy = [\"arap\", \"stretch\"]\n[[expect]]\nwhere = { energy = \"arap\" }\nd_ma = { less_than = { energy = \"arap\" } }",
+            "5:22 the job with model = ball, energy = arap has no other to be compared with | expected axis values that another job has, all else equal | narrow the expectation with \"where\"",
         ),
         (
             "[[expect]]\nd_ma = { factor = 2.0 }",
@@ -680,7 +680,7 @@ fn mistakes_of_toml_are_underlined_too() {
         ),
         (
             "method = \"tiney\"\nx = 1\n",
-            "1:10 unknown method \"tiney\" |  | did you mean \"tiny\"?\n2:1 unknown key \"x\" |  | known: title, description, method, claims, models, settings, vary, zip, exclude, limits, timing, table, plot, rate, expect",
+            "1:10 unknown method \"tiney\" |  | did you mean \"tiny\"?\n1:10 method \"tiny\" needs a model, and there is none |  | add a table [models.NAME]; `vargeo new` prints an example\n2:1 unknown key \"x\" |  | known: title, description, method, claims, models, settings, vary, zip, exclude, limits, timing, table, plot, rate, expect",
         ),
         (
             "method = \"tiny\"\n",

@@ -1,5 +1,7 @@
 //! One test binary; a file a property.
 
+mod catmull_clark;
+mod closest_point;
 mod commands;
 mod connectivity;
 mod damaged_files;
@@ -15,16 +17,19 @@ mod kernels;
 mod keys;
 mod mapping;
 mod mesh_checks;
+mod mixed_fem;
 mod optimizers;
 mod page;
 mod plan;
 mod rates;
 mod reports;
+mod restricted_voronoi;
 mod runner;
 mod sample;
 mod sparse;
 mod squared_distance;
 mod store;
+mod surface_fit;
 mod tiny_method;
 mod volume_fit;
 mod volume_map;

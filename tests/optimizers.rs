@@ -287,6 +287,58 @@ fn every_stop_reason_is_given() {
     }
 }
 
+/// Steps cut short to a thousandth lower the value by less than a hundredth each, far from the minimum.
+#[test]
+fn a_step_cut_short_is_no_convergence() {
+    let mut short = Function {
+        max_step: |_, _| 1e-3,
+        ..rosenbrock()
+    };
+    let newton = Newton {
+        stopping: Stopping {
+            relative_change: 0.01,
+            iterations: 20,
+            ..EXACT
+        },
+        ..Newton::default()
+    };
+    let solution = newton.minimize(&mut short, vec![-1.2, 1.0], &mut Silent);
+    assert_eq!(
+        (solution.stop, solution.counters.iterations),
+        (StopReason::StepLimit, 20)
+    );
+}
+
+/// A Hessian that is sixteen times too stiff costs one iteration where steps may grow, and dozens where they may not.
+#[test]
+fn steps_grow_where_the_model_is_too_stiff() {
+    let iterations = |grow: bool| {
+        let mut stiff = Function {
+            dimension: 1,
+            value: |x| x[0] * x[0],
+            gradient: |x| vec![2.0 * x[0]],
+            hessian: |_| vec![32.0],
+            max_step: FREE,
+        };
+        let newton = Newton {
+            stopping: EXACT,
+            line_search: Backtracking {
+                grow,
+                ..Backtracking::default()
+            },
+        };
+        let solution = newton.minimize(&mut stiff, vec![1.0], &mut Silent);
+        assert_eq!(solution.stop, StopReason::Converged);
+        solution.counters.iterations
+    };
+    assert!(
+        iterations(true) <= 4 && iterations(false) > 100,
+        "{} {}",
+        iterations(true),
+        iterations(false)
+    );
+}
+
 #[test]
 fn line_searches_keep_their_conditions() {
     let mut function = rosenbrock();

@@ -9,7 +9,7 @@ use vargeo::report::{self, Row};
 
 fn written(experiment: &Experiment, rows: &[Row]) -> String {
     let folder = tempfile::tempdir().unwrap();
-    let written = report::write(experiment, rows, folder.path()).unwrap();
+    let written = report::write(experiment, rows, rows.len(), folder.path()).unwrap();
     std::fs::read_to_string(written.page).unwrap()
 }
 
@@ -133,11 +133,11 @@ fn the_same_records_give_the_same_bytes() {
     let mut rows = sample::rows();
     rows[1].mesh = Some(sample::mesh(4, 0.4));
     let (first, second) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
-    report::write(&sample::experiment(), &rows, first.path()).unwrap();
+    report::write(&sample::experiment(), &rows, rows.len(), first.path()).unwrap();
     for row in &mut rows {
         row.cached = true;
     }
-    report::write(&sample::experiment(), &rows, second.path()).unwrap();
+    report::write(&sample::experiment(), &rows, rows.len(), second.path()).unwrap();
     let files = read(first.path());
     assert!(files == read(second.path()));
     let names: Vec<_> = files.iter().map(|file| file.0.to_str().unwrap()).collect();
@@ -178,6 +178,35 @@ fn to_look_at() {
     });
     rows.append(&mut study);
     experiment.tables[0].condition = sample::condition(&[("model", &[json!("ball"), json!("duck"), json!("horse")])]);
-    report::write(&experiment, &rows, &folder).unwrap();
+    report::write(&experiment, &rows, rows.len(), &folder).unwrap();
     println!("{}", folder.display());
+}
+
+/// A hexahedron and a quad are drawn without the diagonals at which they are split.
+#[test]
+fn diagonals_of_quadrilateral_faces_are_not_drawn() {
+    use vargeo::mesh::format::Content;
+    use vargeo::report::picture::{cut, solid::Solid};
+    let corner = |index: usize| [0, 1, 2].map(|axis| ([0x66, 0xcc, 0xf0][axis] >> index & 1) as f64);
+    let points: Vec<[f64; 3]> = (0..8).map(corner).collect();
+    let hexahedron = Solid::from_content(&Content {
+        points: points.clone(),
+        hexahedra: vec![[0, 1, 2, 3, 4, 5, 6, 7]],
+        ..Content::default()
+    });
+    let quad = Solid::from_content(&Content {
+        points,
+        quads: vec![[0, 1, 2, 3]],
+        ..Content::default()
+    });
+    for (solid, faces) in [(hexahedron, 6), (quad, 1)] {
+        assert_eq!(solid.diagonals.len(), faces);
+        let facets = cut::facets(&solid, &solid.points, None);
+        assert_eq!(facets.len(), 2 * faces);
+        assert!(
+            facets
+                .iter()
+                .all(|facet| facet.sides.iter().filter(|&&drawn| drawn).count() == 2)
+        );
+    }
 }

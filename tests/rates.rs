@@ -77,5 +77,5 @@ fn jobs_without_figures_are_counted() {
     experiment.rates = vec![rate];
     let found = fits(&experiment, &rows);
     assert_eq!((found[0].points.len(), found[0].left_out), (12, 3));
-    assert!(found[0].sentence().contains("3 jobs without usable figures"));
+    assert!(found[0].sentence().contains("3 jobs left out"));
 }

@@ -52,6 +52,7 @@ fn several_jobs_in_a_row_give_mean_and_deviation() {
         title: None,
         rows: vec!["family".into(), "h".into()],
         columns: vec!["error".into()],
+        across: Vec::new(),
         condition: sample::condition(&[("family", &[json!("even")])]),
         published: None,
     };
@@ -149,7 +150,7 @@ fn an_axis_comes_before_a_figure_or_trace_of_its_name() {
     let names = ["dirichlet", "stretch", "lscm"].map(String::from).to_vec();
     assert_eq!(chart.x.kind, plot::axis::Kind::Category(names));
     let sheet = compare::Sheet::read(&jobs::write(&sample::experiment(), &rows).unwrap()).unwrap();
-    assert!(compare::compare(&sheet, &sheet).same());
+    assert!(compare::compare(&sheet, &sheet, 0.0, &[]).same());
 }
 
 #[test]
@@ -180,9 +181,46 @@ fn two_result_sets_side_by_side() {
     right[1].record.measurement.wall_seconds = vec![0.5];
     right[3].record.result.stop = "stalled".into();
     let sheet = |rows: &[_]| compare::Sheet::read(&jobs::write(&experiment, rows).unwrap()).unwrap();
-    let comparison = compare::compare(&sheet(&left), &sheet(&right));
+    let comparison = compare::compare(&sheet(&left), &sheet(&right), 0.0, &[]);
     assert!(!comparison.same() && comparison.results().count() == 2);
     insta::assert_snapshot!("comparison", compare::describe(&comparison, "before", "after"));
-    assert!(compare::compare(&sheet(&left), &sheet(&left)).same());
+    assert!(compare::compare(&sheet(&left), &sheet(&left), 0.0, &[]).same());
+    // 254.9 against 280 is a tenth; the word of the end has no tolerance.
+    let near = compare::compare(&sheet(&left), &sheet(&right), 0.2, &[]);
+    assert_eq!(near.results().count(), 1);
+    let chosen = compare::compare(&sheet(&left), &sheet(&right), 0.0, &["d_ma".to_string()]);
+    assert!(chosen.results().all(|difference| difference.column.starts_with("d_ma")) && chosen.results().count() == 1);
     assert!(compare::Sheet::read(b"a,b\n1,2\n").is_err());
+}
+
+#[test]
+fn columns_stand_side_by_side_for_the_values_across() {
+    let experiment = sample::experiment();
+    let table = Table {
+        rows: vec!["model".into()],
+        across: vec!["energy".into()],
+        columns: vec!["d_ma".into()],
+        published: None,
+        ..experiment.tables[0].clone()
+    };
+    let rows = sample::rows();
+    let grid = build(&experiment, &table, &rows);
+    let heads: Vec<&str> = grid.head.iter().map(|head| head.text.as_str()).collect();
+    assert_eq!(
+        heads,
+        [
+            "model",
+            "d_ma, energy dirichlet",
+            "d_ma, energy stretch",
+            "d_ma, energy lscm"
+        ]
+    );
+    let stretch = rows
+        .iter()
+        .position(|row| row.axis("energy") == Some(&"stretch".into()));
+    let ours = rows[stretch.expect("a job with stretch")].figure("d_ma");
+    match grid.body[0][2].content {
+        vargeo::report::table::Content::Figure { value, spread, .. } => assert_eq!((Some(value), spread), (ours, None)),
+        ref other => panic!("{other:?}"),
+    }
 }

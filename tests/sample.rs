@@ -255,6 +255,7 @@ pub fn experiment() -> Experiment {
             columns: ["d_aa", "d_ma", "scaled_jacobian_min", "inverted", "seconds"]
                 .map(String::from)
                 .to_vec(),
+            across: Vec::new(),
             condition: Condition::new(),
             published: Some(published()),
         }],

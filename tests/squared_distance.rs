@@ -178,3 +178,134 @@ fn derivatives() {
         }
     }
 }
+
+/// A bumpy torus.
+fn torus(n: usize, m: usize) -> (Vec<[f64; 3]>, Vec<[u32; 3]>) {
+    let (mut points, mut cells) = (Vec::new(), Vec::new());
+    let noise = noise(n * m, 9);
+    let at = |i: usize, j: usize| ((i % n) * m + j % m) as u32;
+    for i in 0..n {
+        for j in 0..m {
+            let (a, b) = (
+                i as f64 / n as f64 * std::f64::consts::TAU,
+                j as f64 / m as f64 * std::f64::consts::TAU,
+            );
+            let radius = 0.4 + 0.01 * noise[i * m + j][0];
+            points.push([
+                (1.0 + radius * b.cos()) * a.cos(),
+                (1.0 + radius * b.cos()) * a.sin(),
+                radius * b.sin(),
+            ]);
+            cells.push([at(i, j), at(i + 1, j), at(i + 1, j + 1)]);
+            cells.push([at(i, j), at(i + 1, j + 1), at(i, j + 1)]);
+        }
+    }
+    (points, cells)
+}
+
+#[test]
+fn same_bits_for_any_number_of_threads() {
+    let (points, cells) = torus(60, 30);
+    let sites: Vec<[f64; 3]> = points
+        .iter()
+        .step_by(3)
+        .zip(noise(600, 4))
+        .map(|(x, d)| std::array::from_fn(|k| x[k] + 0.03 * d[k]))
+        .collect();
+    let normals: Vec<[f64; 3]> = noise(sites.len(), 6).into_iter().map(unit).collect();
+    let run = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .expect("threads");
+        pool.install(|| {
+            let mut term = SquaredDistance::new(&points, &cells).expect("a valid surface");
+            let mut surface = vec![[0.0; 3]; points.len()];
+            let mut by_sites = vec![[0.0; 3]; sites.len()];
+            let mut areas = vec![0.0; sites.len()];
+            let options = Options {
+                anisotropy: Anisotropy::Sites(7.0, &normals),
+                compatibility: Some(Compatibility {
+                    weight: 0.01,
+                    normals: &normals,
+                }),
+                derivative: Derivative::Complete,
+            };
+            let wanted = Wanted {
+                surface: Some(&mut surface),
+                sites: Some(&mut by_sites),
+                areas: Some(&mut areas),
+                ..Wanted::default()
+            };
+            let value = term.evaluate(&points, &PointTree::new(&sites), &options, wanted);
+            let numbers = surface
+                .iter()
+                .flatten()
+                .chain(by_sites.iter().flatten())
+                .chain(&areas)
+                .chain([&value]);
+            numbers.map(|x| x.to_bits()).collect::<Vec<_>>()
+        })
+    };
+    let one = run(1);
+    assert_eq!(one, run(2));
+    assert_eq!(one, run(4));
+}
+
+/// Moving the surface and the sites together changes nothing: values agree, gradients turn along.
+#[test]
+fn rigid_motions() {
+    let (points, cells) = torus(30, 15);
+    let sites: Vec<[f64; 3]> = points.iter().step_by(4).copied().collect();
+    let turn = |x: [f64; 3]| {
+        let (s, c) = 0.7f64.sin_cos();
+        let [x, y, z] = [c * x[0] - s * x[1], s * x[0] + c * x[1], x[2]];
+        [x, c * y - s * z, s * y + c * z]
+    };
+    let moved = |x: &[[f64; 3]]| -> Vec<[f64; 3]> {
+        x.iter()
+            .map(|&x| {
+                let y = turn(x);
+                [y[0] + 3.0, y[1] - 1.0, y[2] + 0.5]
+            })
+            .collect()
+    };
+    let evaluate = |points: &[[f64; 3]], sites: &[[f64; 3]]| {
+        let mut term = SquaredDistance::new(points, &cells).expect("a valid surface");
+        let mut gradient = vec![[0.0; 3]; sites.len()];
+        let mut areas = vec![0.0; sites.len()];
+        let options = Options {
+            anisotropy: Anisotropy::Facets(50.0),
+            ..Options::default()
+        };
+        let wanted = Wanted {
+            sites: Some(&mut gradient),
+            areas: Some(&mut areas),
+            ..Wanted::default()
+        };
+        let value = term.evaluate(points, &PointTree::new(sites), &options, wanted);
+        (value, gradient, areas.iter().sum::<f64>())
+    };
+    let (value, gradient, area) = evaluate(&points, &sites);
+    let (other, turned, same) = evaluate(&moved(&points), &moved(&sites));
+    assert!((value - other).abs() < 1e-12 * value, "{value} and {other}");
+    assert!((area - same).abs() < 1e-12 * area);
+    let expected: Vec<[f64; 3]> = gradient.iter().map(|&x| turn(x)).collect();
+    assert!(difference(&turned, &expected) < 1e-9 * norm(&gradient));
+}
+
+/// Steps that leave the world behind: an infinite value, which a line search takes for too long a step.
+#[test]
+fn values_beyond_measure() {
+    let (points, cells) = torus(6, 5);
+    let mut term = SquaredDistance::new(&points, &cells).expect("a valid surface");
+    let mut value = |points: &[[f64; 3]], sites: &[[f64; 3]]| {
+        term.evaluate(points, &PointTree::new(sites), &Options::default(), Wanted::default())
+    };
+    assert!(value(&points, &points).is_finite());
+    assert_eq!(value(&points, &[]), f64::INFINITY);
+    assert_eq!(value(&points, &[[f64::NAN; 3]]), f64::INFINITY);
+    let mut broken = points.clone();
+    broken[3][1] = f64::NEG_INFINITY;
+    assert_eq!(value(&broken, &points), f64::INFINITY);
+}

@@ -515,6 +515,33 @@ fn an_energy_beyond_measure_is_approached() {
     assert!(metric(&outcome, "inverted") == 0.0 && metric(&outcome, "energy").is_finite());
 }
 
+/// On this body the gradient criterion stalls and relaxation gets the solver going again.
+#[test]
+fn relaxation_saves_iterations() {
+    let solve = |relaxation: bool| {
+        let bumpy = onto_cube(
+            "bumpy",
+            json!({ "tetrahedra": 1500 }),
+            json!({ "swirl": 1.0, "warp": 0.12 }),
+        );
+        let chosen = json!({ "preset": "paper", "energy": "lpm", "relaxed-newton": { "relaxation": relaxation } });
+        map(bumpy, chosen, &mut Silent).expect("a map")
+    };
+    let (with, without) = (solve(true), solve(false));
+    for outcome in [&with, &without] {
+        assert_eq!(outcome.stop, "converged", "{}", outcome.reason);
+    }
+    assert!(with.counters["relaxations"] > 0 && with.counters["relaxation_iterations"] > 0);
+    assert_eq!(without.counters["relaxations"], 0);
+    assert!(
+        with.counters["iterations"] < without.counters["iterations"],
+        "{:?} {:?}",
+        with.counters,
+        without.counters
+    );
+    close("energy", metric(&with, "energy"), metric(&without, "energy"), 1e-3);
+}
+
 #[test]
 fn an_energy_that_falls_without_bound_is_refused() {
     let wrong = |weighting: &str, energy: &str, barrier: &str| {
@@ -622,6 +649,30 @@ fn settings_that_mean_the_same_share_their_canonical_form() {
             once,
             "{other}: resolving a canonical form changes nothing"
         );
+    }
+    // What a setting switches off has no effect, and no place in the key.
+    let relaxed = |options: Value| json!({ "energy": "arap", "solver": "relaxed-newton", "relaxed-newton": options });
+    for (one, other) in [
+        (
+            relaxed(json!({ "continuation": "off" })),
+            relaxed(json!({ "continuation": "off", "continuation_weight": 3.0, "continuation_rounds": 2 })),
+        ),
+        (
+            relaxed(json!({ "continuation": "on" })),
+            relaxed(json!({ "continuation": "on", "weight": 3.0 })),
+        ),
+        (
+            relaxed(json!({ "relaxation": false })),
+            relaxed(json!({ "relaxation": false, "relaxation_steps": 2 })),
+        ),
+        (
+            json!({ "energy": "arap", "barrier": "none" }),
+            json!({ "energy": "arap", "barrier": "none", "untangle": false, "untangling": { "steps": 3 },
+                    "on_infeasible": "continue" }),
+        ),
+    ] {
+        assert_ne!(one, other);
+        assert_eq!(canonical(one), canonical(other.clone()), "{other}");
     }
     let errors = VolumeMap.check(&json!({ "solver": "locally-injective", "barrier": "none" }));
     assert_eq!(errors.len(), 1);

@@ -2,6 +2,7 @@
 
 use super::Exit;
 use crate::mesh::check::{self, Problem, Severity};
+use crate::mesh::connectivity;
 use crate::mesh::format::{self, CellKind, Content, Format};
 use crate::mesh::summary::{self, Summary};
 use crate::mesh::{TetrahedralMesh, TriangleMesh, bounding_box};
@@ -26,18 +27,28 @@ enum MeshCommand {
         input: PathBuf,
         /// The file to write; its extension tells the format.
         output: PathBuf,
+        /// Write the boundary triangles of the tetrahedra only, outward.
+        #[arg(long)]
+        boundary: bool,
     },
 }
 
 /// Shows or converts.
 pub fn execute(arguments: Arguments) -> Exit {
     let outcome = match (arguments.command, arguments.file) {
-        (Some(MeshCommand::Convert { input, output }), _) => convert(&input, &output),
+        (
+            Some(MeshCommand::Convert {
+                input,
+                output,
+                boundary,
+            }),
+            _,
+        ) => convert(&input, &output, boundary).map(|()| Exit::Well),
         (None, Some(file)) => inspect(&file),
         (None, None) => Err("no file is named".to_string()),
     };
     match outcome {
-        Ok(()) => Exit::Well,
+        Ok(exit) => exit,
         Err(message) => {
             eprintln!("error: {message}");
             Exit::FileWrong
@@ -49,7 +60,7 @@ fn read_bytes(path: &Path) -> Result<Vec<u8>, String> {
     std::fs::read(path).map_err(|error| format!("{}: cannot be read: {error}", path.display()))
 }
 
-fn convert(input: &Path, output: &Path) -> Result<(), String> {
+fn convert(input: &Path, output: &Path, boundary: bool) -> Result<(), String> {
     let name = output.display().to_string();
     let format = Format::of_name(&name).ok_or_else(|| {
         format!(
@@ -57,7 +68,11 @@ fn convert(input: &Path, output: &Path) -> Result<(), String> {
             format::extensions()
         )
     })?;
-    let content = format::read(&input.display().to_string(), &read_bytes(input)?).map_err(|error| error.to_string())?;
+    let mut content =
+        format::read(&input.display().to_string(), &read_bytes(input)?).map_err(|error| error.to_string())?;
+    if boundary {
+        content = boundary_of(content, &input.display().to_string())?;
+    }
     let written = format::write(format, &content).map_err(|message| format!("{name}: {message}"))?;
     for notice in content.notices.iter().chain(&written.notices) {
         eprintln!("notice: {notice}");
@@ -65,8 +80,36 @@ fn convert(input: &Path, output: &Path) -> Result<(), String> {
     std::fs::write(output, &written.bytes).map_err(|error| format!("{name}: cannot be written: {error}"))
 }
 
-/// Label and value of every line of the summary, then problems and notices.
-fn inspect(path: &Path) -> Result<(), String> {
+/// The boundary of the tetrahedra as a surface of its own; fields are left out.
+fn boundary_of(content: Content, name: &str) -> Result<Content, String> {
+    let mut mesh = TetrahedralMesh {
+        points: content.points,
+        cells: content.tetrahedra,
+    };
+    if mesh.cells.is_empty() {
+        return Err(format!("{name}: has no tetrahedra, whose boundary could be written"));
+    }
+    let problems = check::tetrahedra(&mut mesh);
+    if let Some(problem) = problems.iter().find(|problem| problem.severity == Severity::Error) {
+        return Err(format!("{name}: {}", problem.message));
+    }
+    let boundary = connectivity::boundary(&mesh.cells, mesh.points.len());
+    let places = boundary.places();
+    let place = |vertex: u32| places[vertex as usize];
+    Ok(Content {
+        points: boundary
+            .vertices
+            .iter()
+            .map(|&vertex| mesh.points[vertex as usize])
+            .collect(),
+        triangles: boundary.triangles.iter().map(|triangle| triangle.map(place)).collect(),
+        notices: content.notices,
+        ..Content::default()
+    })
+}
+
+/// Label and value of every line of the summary, then problems and notices. Errors in the mesh are those of the file.
+fn inspect(path: &Path) -> Result<Exit, String> {
     let name = path.display().to_string();
     let bytes = read_bytes(path)?;
     let content = format::read(&name, &bytes).map_err(|error| error.to_string())?;
@@ -126,7 +169,8 @@ fn inspect(path: &Path) -> Result<(), String> {
     for notice in notices {
         println!("{:width$}  {notice}", "notice");
     }
-    Ok(())
+    let unsound = problems.iter().any(|problem| problem.severity == Severity::Error);
+    Ok(if unsound { Exit::FileWrong } else { Exit::Well })
 }
 
 /// The summary of tetrahedra, or else of a surface, with its problems; none where the indices are unsound or the cells

@@ -3,6 +3,7 @@
 use super::Exit;
 use super::input::Input;
 use crate::experiment::grid;
+use crate::experiment::job::{Job, Key};
 use crate::experiment::plan::Plan;
 use crate::run::pool::{effort, stored};
 use crate::run::store::{Lookup, Store};
@@ -33,6 +34,7 @@ pub fn execute(arguments: Arguments) -> Exit {
         .map(|job| match (&job.resolved, stored(&store, job, effort)) {
             (None, _) => State::Missing,
             (_, Lookup::Hit(_)) => State::Stored,
+            (Some((_, resolved)), Lookup::Miss) if known_before(&store, resolved) => State::Outdated,
             (_, Lookup::Miss) => State::ToRun,
             (_, Lookup::Damaged { reason, .. }) => {
                 eprintln!(
@@ -52,8 +54,21 @@ pub fn execute(arguments: Arguments) -> Exit {
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum State {
     ToRun,
+    /// Stored by an earlier version of the method, whose results may differ.
+    Outdated,
     Stored,
     Missing,
+}
+
+/// Whether an earlier version of the method has left a result of this job.
+fn known_before(store: &Store, job: &Job) -> bool {
+    (1..job.method_version).any(|method_version| {
+        let earlier = Job {
+            method_version,
+            ..job.clone()
+        };
+        store.entry(&Key::of(&earlier)).exists()
+    })
 }
 
 /// The count of jobs, then a line for each, then the notices.
@@ -64,7 +79,7 @@ fn describe(plan: &Plan, states: &[State]) -> String {
         plan.experiment.title,
         plan.jobs.len(),
         if plan.jobs.len() == 1 { "" } else { "s" },
-        count(State::ToRun),
+        count(State::ToRun) + count(State::Outdated),
         count(State::Stored),
         count(State::Missing),
     );
@@ -72,6 +87,7 @@ fn describe(plan: &Plan, states: &[State]) -> String {
     for (job, state) in plan.jobs.iter().zip(states) {
         let state = match state {
             State::ToRun => "to run",
+            State::Outdated => "outdated",
             State::Stored => "stored",
             State::Missing => "missing",
         };
@@ -80,10 +96,13 @@ fn describe(plan: &Plan, states: &[State]) -> String {
             .as_ref()
             .map_or("", |(key, _)| key.0.get(..12).unwrap_or(&key.0));
         text += &format!(
-            "  {state:<7}  {key:<12}  {:<width$}  {}\n",
+            "  {state:<8}  {key:<12}  {:<width$}  {}\n",
             job.name,
             grid::describe(&job.axes)
         );
+    }
+    if count(State::Outdated) > 0 {
+        text += "notice: outdated results are those of an earlier version of the method; they are computed anew\n";
     }
     for notice in &plan.notices {
         text += &format!("notice: {notice}\n");

@@ -71,8 +71,14 @@ struct Quiet;
 
 impl Listener for Quiet {
     fn event(&mut self, event: &Event<'_>) {
-        if let Event::Warning { text } = event {
-            eprintln!("warning: {text}");
+        match event {
+            Event::Warning { text } => eprintln!("warning: {text}"),
+            Event::Finished { name, record, .. }
+                if matches!(record.result.status, Status::Failed | Status::Refused) =>
+            {
+                eprintln!("error: {name}: {}: {}", record.result.stop, record.result.reason);
+            }
+            _ => {}
         }
     }
 }

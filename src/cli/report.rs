@@ -68,7 +68,13 @@ pub fn execute(arguments: Arguments) -> Exit {
         eprintln!("warning: not stored and left out of the report: {}", absent.join(", "));
     }
     let rows = run::rows(&plan, &store, finished);
-    match run::write_report(&plan.experiment, &rows, &arguments.results, arguments.quiet) {
+    match run::write_report(
+        &plan.experiment,
+        &rows,
+        plan.jobs.len(),
+        &arguments.results,
+        arguments.quiet,
+    ) {
         Ok(_) => Exit::Well,
         Err(exit) => exit,
     }

@@ -38,7 +38,7 @@ pub(super) struct Running {
     /// Threads of each job; what the file's [timing] says by default, else 1. Results do not depend on it.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=4096))]
     threads: Option<u32>,
-    /// Only jobs whose name contains this; the others are reported as far as they are stored.
+    /// Only the job of this name, or the jobs whose names contain it; the others are reported as far as they are stored.
     #[arg(long, value_name = "NAME")]
     only: Vec<String>,
     /// Compute stored jobs again, and compare.
@@ -114,7 +114,13 @@ pub(super) fn run(plan: &Plan, running: &Running) -> Result<Done, Exit> {
         say(&summary(plan, &outcome.finished));
     }
     let rows = rows(plan, &store, outcome.finished);
-    let written = write_report(&plan.experiment, &rows, &running.results, running.quiet)?;
+    let written = write_report(
+        &plan.experiment,
+        &rows,
+        plan.jobs.len(),
+        &running.results,
+        running.quiet,
+    )?;
     Ok(Done {
         exit,
         rows,
@@ -130,7 +136,16 @@ fn choose(plan: &Plan, only: &[String]) -> Result<Option<Vec<usize>>, Exit> {
     let mut chosen = Vec::new();
     for part in only {
         let before = chosen.len();
-        let named = plan.jobs.iter().enumerate().filter(|(_, job)| job.name.contains(part));
+        // A whole name means that job alone.
+        let exact = plan.jobs.iter().any(|job| job.name == *part);
+        let asked = |name: &str| {
+            if exact {
+                name == part
+            } else {
+                name.contains(part.as_str())
+            }
+        };
+        let named = plan.jobs.iter().enumerate().filter(|(_, job)| asked(&job.name));
         chosen.extend(named.map(|(index, _)| index));
         if chosen.len() == before {
             let names = plan.jobs.iter().map(|job| job.name.as_str());
@@ -242,11 +257,12 @@ pub(super) fn rows(plan: &Plan, store: &Store, finished: Vec<Finished>) -> Vec<R
 pub(super) fn write_report(
     experiment: &Experiment,
     rows: &[Row],
+    planned: usize,
     results: &Path,
     quiet: bool,
 ) -> Result<report::Written, Exit> {
     let folder = results.join(&experiment.name);
-    let written = report::write(experiment, rows, &folder).map_err(|error| wrong(&error.to_string()))?;
+    let written = report::write(experiment, rows, planned, &folder).map_err(|error| wrong(&error.to_string()))?;
     if !quiet {
         say(&report::terminal(experiment, rows, None));
         let unmet = written

@@ -153,9 +153,9 @@ impl Checker {
         let known: Vec<&str> = known.into_iter().collect();
         let message = format!("unknown key \"{}\"{place}", entry.key);
         // A key that was written under a table header and belongs above all of them.
-        let top = EXPERIMENT
-            .iter()
-            .filter(|key| !matches!(key.holds, Holds::Plain(Kind::Table(_))) && !owner.is_empty());
+        let top = EXPERIMENT.iter().filter(|key| {
+            !matches!(key.holds, Holds::Plain(Kind::Table(_))) && !owner.is_empty() && !owner.starts_with("[[")
+        });
         let top = top
             .filter(|key| matches!(key.holds, Holds::Plain(_) | Holds::Method))
             .map(|key| key.name);

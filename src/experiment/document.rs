@@ -52,7 +52,7 @@ impl Content {
             Content::Text(_) => "text",
             Content::Integer(_) => "a whole number",
             Content::Number(_) => "a number",
-            Content::Boolean(_) => "true or false",
+            Content::Boolean(_) => "a truth value",
             Content::Date => "a date",
             Content::List(_) => "a list",
             Content::Table(_) => "a table",

@@ -61,6 +61,8 @@ pub struct Table {
     pub rows: Vec<String>,
     /// Metrics, counters and measurements.
     pub columns: Vec<String>,
+    /// Axes for each of whose values every column stands once.
+    pub across: Vec<String>,
     pub condition: Condition,
     /// Printed figures: rows of axis values and metric values.
     pub published: Option<Published>,

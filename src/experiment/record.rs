@@ -130,6 +130,11 @@ pub const STOPS: &[(&str, &str)] = &[
     ),
     ("invalid-input", "a model or a setting cannot be used"),
     (
+        "singular",
+        "the system of equations has no unique solution, with the places named",
+    ),
+    ("out-of-memory", "a factorization found no more memory"),
+    (
         "invalid-start",
         "the start is outside the energy's domain and may not be mended",
     ),

@@ -193,9 +193,16 @@ pub static TABLE: &[Key] = &[
         "rows",
         Holds::AxisNames,
         false,
-        "Axes whose values head each row; those that vary when absent.",
+        "Axes whose values head each row, the first changing most slowly; those that vary when absent. Bold marks the best value \
+         of the last one, all else equal.",
     ),
     key("columns", Holds::Columns, true, "Metrics, counters and measurements."),
+    key(
+        "across",
+        Holds::AxisNames,
+        false,
+        "Axes for each of whose values every column stands once, side by side; they are no rows.",
+    ),
     key(
         "where",
         Holds::Condition,

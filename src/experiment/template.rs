@@ -294,11 +294,18 @@ fn outputs(text: &mut String, method: &dyn Method, varied: Option<&str>) {
     }
     comment(
         text,
+        "A rate: the slope of log y against log x, where x is a metric or an axis of numbers, such as a model's parameter: \
+         model.PARAMETER for its first part, model.ROLE.PARAMETER for another.",
+    );
+    text.push_str("# [[rate]]\n# x = \"model.PARAMETER\"\n# y = \"seconds\"\n# expect = { max = 1.5 }\n\n");
+    comment(
+        text,
         "What `vargeo check` gates: why jobs end, and bounds of metrics, such as NAME = 0 or",
     );
     comment(
         text,
-        "NAME = { min = 1.0, max = 2.0 }; `where = { AXIS = VALUE }` chooses jobs.",
+        "NAME = { min = 1.0, max = 2.0 }, or NAME = { less_than = { AXIS = OTHER }, factor = 0.5 }, which compares with the \
+         jobs that differ in that axis only; `where = { AXIS = VALUE }` chooses jobs.",
     );
     text.push_str("[[expect]]\nstop = \"converged\"\n");
 }

@@ -148,7 +148,9 @@ impl Batches {
         let mut coefficients = vec![Lanes::ZERO; group.coefficients()];
         load_coefficients(batch, x, &mut coefficients);
         let mut places = vec![Lanes::ZERO; 3 * group.element.points()];
-        group.element.places(processor, &coefficients, &mut places, &mut Room::default());
+        group
+            .element
+            .places(processor, &coefficients, &mut places, &mut Room::default());
         for lane in 0..batch.filled {
             for (point, place) in places.chunks_exact(3).enumerate() {
                 let place = std::array::from_fn(|component| place[component].0[lane]);
@@ -171,7 +173,9 @@ impl Batches {
         let mut jacobians = [Vec::new(), Vec::new(), Vec::new()];
         load_coefficients(batch, x, &mut coefficients);
         let mut rooms = Room::default();
-        group.element.jacobians(processor, &coefficients, &mut jacobians, &mut rooms);
+        group
+            .element
+            .jacobians(processor, &coefficients, &mut jacobians, &mut rooms);
         for lane in 0..batch.filled {
             let inverse: [f64; 9] = std::array::from_fn(|entry| batch.inverse[entry].0[lane]);
             for point in 0..group.element.points() {

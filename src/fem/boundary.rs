@@ -109,11 +109,16 @@ impl Boundary {
                     slots[i * n + j] = Slot::of(vertex as usize, false);
                 }
                 // Edges with the fixed index of the other direction.
-                for (from, to, along_first, other) in [(a, b, true, 0), (d, c, true, 1), (a, d, false, 0), (b, c, false, 1)]
+                for (from, to, along_first, other) in
+                    [(a, b, true, 0), (d, c, true, 1), (a, d, false, 0), (b, c, false, 1)]
                 {
                     let (first, edge_order) = edge(from, to);
                     for j in 1..edge_order {
-                        let place = if along_first { (1 + j) * n + other } else { other * n + 1 + j };
+                        let place = if along_first {
+                            (1 + j) * n + other
+                        } else {
+                            other * n + 1 + j
+                        };
                         slots[place] = Slot::of(first + j - 1, from > to && j % 2 == 0);
                     }
                 }
@@ -168,7 +173,10 @@ impl Boundary {
                         }
                     }
                 }
-                result.lines.entry(order).or_insert_with(|| line_table(space.basis, order, &points));
+                result
+                    .lines
+                    .entry(order)
+                    .or_insert_with(|| line_table(space.basis, order, &points));
             } else {
                 let mut sorted = [corners[0], corners[1], corners[2]];
                 sorted.sort_unstable();
@@ -334,7 +342,9 @@ impl Boundary {
     pub fn each_row(&self, mut visit: impl FnMut(&[Slot], &[f64], usize)) {
         let mut rows = Vec::new();
         for patch in &self.patches {
-            self.each_sample(patch, &mut rows, &mut |sample, weights| visit(&patch.slots, weights, sample));
+            self.each_sample(patch, &mut rows, &mut |sample, weights| {
+                visit(&patch.slots, weights, sample)
+            });
         }
     }
 

@@ -3,8 +3,8 @@
 //! Hexahedra go by sum factorization: one index of the coefficients after the other is replaced by points, which costs
 //! `O(n^4)` instead of `O(n^6)`. Prisms contract the triangle, then the line. Tetrahedra use dense tables.
 
-use super::contraction::Contraction;
 use super::basis::Basis;
+use super::contraction::Contraction;
 use super::functions::{Table, line_table, tetrahedron_table, triangle_table};
 use super::quadrature::CellQuadrature;
 use super::space::Kind;

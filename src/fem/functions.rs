@@ -253,7 +253,8 @@ pub fn cell_table(basis: &dyn Basis, kind: Kind, quadrature: &CellQuadrature) ->
         }
         CellQuadrature::Prism(triangle, line) => {
             let lines = line_table(basis, kind.order, &line.points);
-            let levels = [kind.last[0], kind.last[1], 2].map(|last| triangle_table(basis, kind.order, last, &triangle.points));
+            let levels =
+                [kind.last[0], kind.last[1], 2].map(|last| triangle_table(basis, kind.order, last, &triangle.points));
             let n = lines.functions;
             for w in 0..lines.points {
                 for point in 0..triangle.points.len() {

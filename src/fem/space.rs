@@ -159,7 +159,9 @@ impl Space {
             })
             .collect();
         if nodes > (u32::MAX / 2 - 1) as usize {
-            return Err(format!("{nodes} nodes are too many; lower the order or use fewer cells"));
+            return Err(format!(
+                "{nodes} nodes are too many; lower the order or use fewer cells"
+            ));
         }
         let mut space = Space {
             basis,
@@ -299,7 +301,9 @@ impl Space {
             sorted.sort_unstable_by_key(|&corner| corners[3 * level + corner]);
             last[level] = sorted[2];
             for (number, jk) in triangle_inside(face_order).into_iter().enumerate() {
-                let Some(function) = inside.iter().position(|own| *own == jk) else { continue };
+                let Some(function) = inside.iter().position(|own| *own == jk) else {
+                    continue;
+                };
                 let slot = place(3 + 3 * (order - 1) + function, level);
                 slots[slot] = Slot::new(start + number, sorted[0] > sorted[1] && jk[0] % 2 == 0);
             }
@@ -348,7 +352,11 @@ impl Space {
         let position = |given: &[usize], wanted: &[usize]| given.iter().all(|corner| wanted.contains(corner));
         for [a, b] in [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]] {
             let wanted = [sorted[a], sorted[b]];
-            let edge = shape.edges().iter().position(|edge| position(edge, &wanted)).unwrap_or(0);
+            let edge = shape
+                .edges()
+                .iter()
+                .position(|edge| position(edge, &wanted))
+                .unwrap_or(0);
             let (start, edge_order) = self.edge(topology.cell_edges[cell][edge] as usize);
             for j in 1..order {
                 slots.push(if j < edge_order {
@@ -361,7 +369,11 @@ impl Space {
         let inside = triangle_inside(order);
         for [a, b, c] in [[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]] {
             let wanted = [sorted[a], sorted[b], sorted[c]];
-            let face = shape.faces().iter().position(|face| position(face, &wanted)).unwrap_or(0);
+            let face = shape
+                .faces()
+                .iter()
+                .position(|face| position(face, &wanted))
+                .unwrap_or(0);
             let (start, face_order) = self.face(topology.cell_faces[cell][face] as usize);
             let present = triangle_inside(face_order);
             for jk in &inside {
@@ -482,9 +494,17 @@ fn common_functions(shape: Shape, from: usize, to: usize) -> Vec<(usize, usize)>
             }
             for number in 0..4 {
                 let inside = triangle_inside(least);
-                pairs.extend(inside.into_iter().map(|jk| (face(from, number, jk), face(to, number, jk))));
+                pairs.extend(
+                    inside
+                        .into_iter()
+                        .map(|jk| (face(from, number, jk), face(to, number, jk))),
+                );
             }
-            pairs.extend(tetrahedron_inside(least).into_iter().map(|ijk| (cell(from, ijk), cell(to, ijk))));
+            pairs.extend(
+                tetrahedron_inside(least)
+                    .into_iter()
+                    .map(|ijk| (cell(from, ijk), cell(to, ijk))),
+            );
         }
     }
     pairs

@@ -186,18 +186,21 @@ impl VolumeEnergy {
                 let sign = if place & 1 == 1 { -1.0 } else { 1.0 };
                 std::array::from_fn::<f64, 3, _>(|axis| sign * forces[lane / WIDTH + axis].0[lane % WIDTH])
             };
-            gradient.par_chunks_mut(3 * 1024).enumerate().for_each(|(chunk, gradient)| {
-                for (local, gradient) in gradient.chunks_exact_mut(3).enumerate() {
-                    let node = chunk * 1024 + local;
-                    let mut sum = [0.0; 3];
-                    for &place in &self.places[self.offsets[node]..self.offsets[node + 1]] {
-                        sum = add(sum, flat(place));
+            gradient
+                .par_chunks_mut(3 * 1024)
+                .enumerate()
+                .for_each(|(chunk, gradient)| {
+                    for (local, gradient) in gradient.chunks_exact_mut(3).enumerate() {
+                        let node = chunk * 1024 + local;
+                        let mut sum = [0.0; 3];
+                        for &place in &self.places[self.offsets[node]..self.offsets[node + 1]] {
+                            sum = add(sum, flat(place));
+                        }
+                        for axis in 0..3 {
+                            gradient[axis] += scale * sum[axis];
+                        }
                     }
-                    for axis in 0..3 {
-                        gradient[axis] += scale * sum[axis];
-                    }
-                }
-            });
+                });
         }
         *self.forces.lock().unwrap_or_else(|poison| poison.into_inner()) = forces;
         evaluation
@@ -223,7 +226,14 @@ impl VolumeEnergy {
     }
 
     /// One batch; forces are wanted unless there is no room for them.
-    fn batch(&self, scratch: &mut Scratch, group: &Group, batch: &Batch, x: &[f64], forces: &mut [Lanes]) -> Evaluation {
+    fn batch(
+        &self,
+        scratch: &mut Scratch,
+        group: &Group,
+        batch: &Batch,
+        x: &[f64],
+        forces: &mut [Lanes],
+    ) -> Evaluation {
         let element = &group.element;
         scratch.coefficients.resize(group.coefficients(), Lanes::ZERO);
         load_coefficients(batch, x, &mut scratch.coefficients);
@@ -266,11 +276,7 @@ impl VolumeEnergy {
         let least_determinant = sums[1].0.iter().copied().fold(f64::INFINITY, f64::min);
         let invalid = self.energy().is_barrier() && !(least_determinant > 0.0);
         Evaluation {
-            value: if invalid {
-                f64::INFINITY
-            } else {
-                sums[0].0.iter().sum()
-            },
+            value: if invalid { f64::INFINITY } else { sums[0].0.iter().sum() },
             least_determinant: if sums[1].0.iter().any(|value| value.is_nan()) {
                 f64::NAN
             } else {

@@ -1,11 +1,11 @@
 //! The order of points along a Hilbert curve: neighbours in the order are neighbours in space.
 //!
-//! Positions on the curve follow Skilling, "Programming the Hilbert curve" (2004), with 16 bits an axis.
+//! Positions on the curve follow Skilling, "Programming the Hilbert curve" (2004), with 21 bits an axis.
 
 /// Bits of a coordinate on the curve.
-const BITS: u32 = 16;
+const BITS: u32 = 21;
 
-/// The position on the curve of a cell of the grid with `2^16` cells an axis.
+/// The position on the curve of a cell of the grid with `2^21` cells an axis.
 fn position(mut x: [u32; 3]) -> u64 {
     let top = 1 << (BITS - 1);
     let mut bit = top;
@@ -58,8 +58,8 @@ pub fn order(points: &[[f64; 3]], keys: &mut Vec<(u64, u32)>, order: &mut Vec<u3
     };
     keys.clear();
     keys.extend(points.iter().enumerate().map(|(index, point)| {
-        // The conversion saturates, so that any number gives a cell of the grid.
-        let cell = std::array::from_fn(|axis| ((point[axis] - low[axis]) * scale) as u16 as u32);
+        // The conversion saturates, and the mask keeps what is not finite within the grid.
+        let cell = std::array::from_fn(|axis| ((point[axis] - low[axis]) * scale) as u32 & ((1 << BITS) - 1));
         (position(cell), index as u32)
     }));
     keys.sort_unstable();

@@ -3,31 +3,38 @@
 //!
 //! Building is a sort and one sweep, so that a tree for moving points can be built anew for every evaluation. Answers do
 //! not depend on the shape of the tree: they are exact in the rounded squared distances, and ties go to the smaller index.
+//! Of several points in one place only the one with the smallest index is in the tree; the others are its twins.
 
 use super::hilbert;
+use crate::linalg::lanes::{Lanes, Vector, WIDTH};
 
-/// Points in a leaf, and children of a node.
-pub const WIDTH: usize = 8;
-/// Enough for two pending nodes of eight children a level and 2^32 points.
+/// Enough for the pending children of eight a level and 2^32 points.
 const STACK: usize = 128;
+/// No twin.
+const NONE: u32 = u32::MAX;
+
+/// Coordinates must stay below this, so that no squared distance overflows.
+pub const LARGEST: f64 = 1e150;
+
+/// True when every coordinate is a number below [`LARGEST`] in magnitude.
+pub fn within_reach(points: &[[f64; 3]]) -> bool {
+    points.iter().flatten().all(|x| x.abs() < LARGEST)
+}
 
 /// Eight boxes side by side. An absent box lies at infinity.
 #[derive(Clone, Copy, Debug)]
 struct Boxes {
-    low: [[f64; WIDTH]; 3],
-    high: [[f64; WIDTH]; 3],
+    low: [Lanes; 3],
+    high: [Lanes; 3],
 }
 
-const NO_BOXES: Boxes = Boxes {
-    low: [[f64::INFINITY; WIDTH]; 3],
-    high: [[f64::INFINITY; WIDTH]; 3],
-};
+const FAR: Lanes = Lanes([f64::INFINITY; WIDTH]);
 
 /// Eight points side by side. An absent point lies at infinity.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Leaf {
-    pub(crate) points: [[f64; WIDTH]; 3],
-    pub(crate) indices: [u32; WIDTH],
+struct Leaf {
+    points: [Lanes; 3],
+    indices: [u32; WIDTH],
 }
 
 /// Points and the tree over them. All memory is reused by [`PointTree::set`].
@@ -37,6 +44,8 @@ pub struct PointTree {
     leaves: Vec<Leaf>,
     /// `levels[0]` holds the boxes of the leaves, eight a node; `levels[l]` the boxes of the nodes of `levels[l - 1]`.
     levels: Vec<Vec<Boxes>>,
+    /// The next larger index in the same place. Empty when all places differ.
+    twins: Vec<u32>,
     keys: Vec<(u64, u32)>,
     order: Vec<u32>,
     finite: bool,
@@ -54,38 +63,41 @@ impl PointTree {
         &self.points
     }
 
-    /// True when every coordinate is a finite number. Searches need this.
+    /// True when every coordinate is a number below [`LARGEST`] in magnitude. Searches need this.
     pub fn is_finite(&self) -> bool {
         self.finite
     }
 
-    /// The points' indices along the Hilbert curve.
-    pub fn order(&self) -> &[u32] {
-        &self.order
+    /// The next larger index of a point in the same place.
+    pub fn twin(&self, index: u32) -> Option<u32> {
+        self.twins.get(index as usize).copied().filter(|&twin| twin != NONE)
     }
 
     /// Builds the tree over other points.
     pub fn set(&mut self, points: &[[f64; 3]]) {
         self.points.clear();
         self.points.extend_from_slice(points);
-        self.finite = points.iter().flatten().all(|x| x.is_finite());
+        self.finite = within_reach(points);
         hilbert::order(points, &mut self.keys, &mut self.order);
+        self.remove_twins();
         self.leaves.clear();
         for group in self.order.chunks(WIDTH) {
             let mut leaf = Leaf {
-                points: [[f64::INFINITY; WIDTH]; 3],
-                indices: [u32::MAX; WIDTH],
+                points: [FAR; 3],
+                indices: [NONE; WIDTH],
             };
             for (lane, &index) in group.iter().enumerate() {
                 leaf.indices[lane] = index;
                 for axis in 0..3 {
-                    leaf.points[axis][lane] = points[index as usize][axis];
+                    leaf.points[axis].0[lane] = points[index as usize][axis];
                 }
             }
             self.leaves.push(leaf);
         }
         let mut depth = 0;
+        // Boxes to make on this level, and things in the last of them.
         let mut count = self.leaves.len();
+        let mut things = self.order.len();
         loop {
             if self.levels.len() == depth {
                 self.levels.push(Vec::new());
@@ -93,26 +105,31 @@ impl PointTree {
             let (below, level) = self.levels.split_at_mut(depth);
             let level = &mut level[0];
             level.clear();
-            level.resize(count.div_ceil(WIDTH), NO_BOXES);
+            level.resize(
+                count.div_ceil(WIDTH),
+                Boxes {
+                    low: [FAR; 3],
+                    high: [FAR; 3],
+                },
+            );
             for child in 0..count {
                 let boxes = &mut level[child / WIDTH];
+                let present = (things - child * WIDTH).min(WIDTH);
                 for axis in 0..3 {
                     let (low, high) = match below.last() {
                         None => {
-                            let x = &self.leaves[child].points[axis];
-                            let present = (points.len() - child * WIDTH).min(WIDTH);
-                            (&x[..present], &x[..present])
+                            let leaf = &self.leaves[child];
+                            (&leaf.points[axis], &leaf.points[axis])
                         }
-                        Some(below) => {
-                            let present = (below_count(self.leaves.len(), depth) - child * WIDTH).min(WIDTH);
-                            (&below[child].low[axis][..present], &below[child].high[axis][..present])
-                        }
+                        Some(below) => (&below[child].low[axis], &below[child].high[axis]),
                     };
-                    boxes.low[axis][child % WIDTH] = low.iter().copied().fold(f64::INFINITY, f64::min);
-                    boxes.high[axis][child % WIDTH] = high.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+                    boxes.low[axis].0[child % WIDTH] = low.0[..present].iter().copied().fold(f64::INFINITY, f64::min);
+                    boxes.high[axis].0[child % WIDTH] =
+                        high.0[..present].iter().copied().fold(f64::NEG_INFINITY, f64::max);
                 }
             }
             depth += 1;
+            things = count;
             count = level.len();
             if count <= 1 {
                 break;
@@ -121,18 +138,65 @@ impl PointTree {
         self.levels.truncate(depth);
     }
 
-    /// Squared distances from `x` to the eight boxes of a node; infinite for an absent box.
-    #[inline(always)]
-    fn distances(boxes: &Boxes, x: [f64; 3]) -> [f64; WIDTH] {
-        let mut sum = [0.0; WIDTH];
-        for axis in 0..3 {
-            for lane in 0..WIDTH {
-                let below = boxes.low[axis][lane] - x[axis];
-                let above = x[axis] - boxes.high[axis][lane];
-                let outside = if below > above { below } else { above };
-                let outside = if outside > 0.0 { outside } else { 0.0 };
-                sum[lane] += outside * outside;
+    /// Leaves one index a place in `order`, and links the others to it.
+    fn remove_twins(&mut self) {
+        self.twins.clear();
+        let points = &self.points;
+        let place = |index: u32| points[index as usize].map(|x| if x == 0.0 { 0 } else { x.to_bits() });
+        let mut start = 0;
+        while start < self.keys.len() {
+            let key = self.keys[start].0;
+            let mut end = start + 1;
+            while end < self.keys.len() && self.keys[end].0 == key {
+                end += 1;
             }
+            if end - start > 1 {
+                let run = &mut self.order[start..end];
+                // Sorted by place only where there are many, to keep the curve's order.
+                run.sort_unstable_by_key(|&index| (place(index), index));
+                let mut previous = run[0];
+                for index in &mut run[1..] {
+                    if place(*index) == place(previous) {
+                        if self.twins.is_empty() {
+                            self.twins.resize(points.len(), NONE);
+                        }
+                        self.twins[previous as usize] = *index;
+                        previous = *index;
+                        *index = NONE;
+                    } else {
+                        previous = *index;
+                    }
+                }
+            }
+            start = end;
+        }
+        if !self.twins.is_empty() {
+            self.order.retain(|&index| index != NONE);
+        }
+    }
+
+    /// Squared distances from `x` to eight boxes; infinite for an absent box.
+    #[inline(always)]
+    fn distances<V: Vector>(boxes: &Boxes, x: [f64; 3]) -> V {
+        let zero = V::constant(0.0);
+        let mut sum = zero;
+        for axis in 0..3 {
+            let here = V::constant(x[axis]);
+            let below = V::load(&boxes.low[axis]) - here;
+            let above = here - V::load(&boxes.high[axis]);
+            let outside = below.max(above).max(zero);
+            sum = sum + outside * outside;
+        }
+        sum
+    }
+
+    /// Squared distances from `x` to eight points; infinite for an absent point.
+    #[inline(always)]
+    fn squares<V: Vector>(leaf: &Leaf, x: [f64; 3]) -> V {
+        let mut sum = V::constant(0.0);
+        for axis in 0..3 {
+            let difference = V::load(&leaf.points[axis]) - V::constant(x[axis]);
+            sum = sum + difference * difference;
         }
         sum
     }
@@ -140,15 +204,19 @@ impl PointTree {
     /// The point nearest to `x` and its squared distance; among equally near points the one with the smallest index.
     /// `hint` is the index of a point expected to be near: a good one saves time and nothing else. `None` without points.
     pub fn nearest(&self, x: [f64; 3], hint: Option<u32>) -> Option<(u32, f64)> {
-        if self.points.is_empty() {
-            return None;
-        }
-        let start = hint.unwrap_or(self.order[0]);
-        let distance = |index: u32| {
-            let [a, b, c] = self.points[index as usize];
-            (a - x[0]) * (a - x[0]) + (b - x[1]) * (b - x[1]) + (c - x[2]) * (c - x[2])
-        };
-        let mut best = (distance(start), start);
+        self.nearest_in::<Lanes>(x, hint)
+    }
+
+    /// [`PointTree::nearest`] in vector registers.
+    #[inline(always)]
+    pub(crate) fn nearest_in<V: Vector>(&self, x: [f64; 3], hint: Option<u32>) -> Option<(u32, f64)> {
+        let start = hint.or(self.order.first().copied())?;
+        let [a, b, c] = self.points[start as usize];
+        let mut best = (
+            (a - x[0]) * (a - x[0]) + (b - x[1]) * (b - x[1]) + (c - x[2]) * (c - x[2]),
+            start,
+        );
+        let mut lanes = Lanes::ZERO;
         let mut stack = [(0.0f64, 0u32, 0u32); STACK];
         let mut height = 1;
         stack[0] = (0.0, self.levels.len() as u32, 0);
@@ -160,90 +228,93 @@ impl PointTree {
             }
             if level == 0 {
                 let leaf = &self.leaves[node as usize];
-                let mut squares = [0.0; WIDTH];
-                for axis in 0..3 {
-                    for lane in 0..WIDTH {
-                        let difference = leaf.points[axis][lane] - x[axis];
-                        squares[lane] += difference * difference;
-                    }
-                }
-                for lane in 0..WIDTH {
-                    if squares[lane] <= best.0 && (squares[lane], leaf.indices[lane]) < best {
-                        best = (squares[lane], leaf.indices[lane]);
+                let squares = Self::squares::<V>(leaf, x);
+                // Not farther than the best.
+                let mut near = !V::bits(V::constant(best.0).less(squares));
+                squares.store(&mut lanes);
+                while near != 0 {
+                    let lane = near.trailing_zeros() as usize;
+                    near &= near - 1;
+                    if (lanes.0[lane], leaf.indices[lane]) < best {
+                        best = (lanes.0[lane], leaf.indices[lane]);
                     }
                 }
                 continue;
             }
-            let distances = Self::distances(&self.levels[level as usize - 1][node as usize], x);
+            let distances = Self::distances::<V>(&self.levels[level as usize - 1][node as usize], x);
+            let mut near = !V::bits(V::constant(best.0).less(distances));
+            distances.store(&mut lanes);
             let base = height;
-            for lane in 0..WIDTH {
-                if distances[lane] <= best.0 && distances[lane] < f64::INFINITY {
-                    // Kept in falling order of distance, so that the nearest child is visited first.
-                    let mut slot = height;
-                    while slot > base && stack[slot - 1].0 < distances[lane] {
-                        stack[slot] = stack[slot - 1];
-                        slot -= 1;
-                    }
-                    stack[slot] = (distances[lane], level - 1, node * WIDTH as u32 + lane as u32);
-                    height += 1;
+            while near != 0 {
+                let lane = near.trailing_zeros() as usize;
+                near &= near - 1;
+                let distance = lanes.0[lane];
+                // Kept in falling order of distance, so that the nearest child is visited first.
+                let mut slot = height;
+                while slot > base && stack[slot - 1].0 < distance {
+                    stack[slot] = stack[slot - 1];
+                    slot -= 1;
                 }
+                stack[slot] = (distance, level - 1, node * WIDTH as u32 + lane as u32);
+                height += 1;
             }
         }
         Some((best.1, best.0))
     }
 
-    /// Appends, in no particular order, the points that lie less than the square root of `squares[k]` from `centres[k]`
-    /// for some `k`.
-    pub fn within_any(&self, centres: &[[f64; 3]; 3], squares: [f64; 3], found: &mut Vec<u32>) {
+    /// Appends, in no particular order, the points that for every row `bound` of `bounds` are less than the square root of
+    /// `bound[k]` away from `centres[k]` for some `k`.
+    #[inline(always)]
+    pub(crate) fn contenders<V: Vector>(&self, centres: &[[f64; 3]; 3], bounds: &[[f64; 3]], found: &mut Vec<u32>) {
+        if self.order.is_empty() {
+            return;
+        }
         let mut stack = [(0u32, 0u32); STACK];
         let mut height = 1;
         stack[0] = (self.levels.len() as u32, 0);
-        if self.points.is_empty() {
-            return;
-        }
         while height > 0 {
             height -= 1;
             let (level, node) = stack[height];
-            let mut near = [false; WIDTH];
-            if level == 0 {
-                let leaf = &self.leaves[node as usize];
-                for ball in 0..3 {
-                    let mut sum = [0.0; WIDTH];
-                    for axis in 0..3 {
-                        for lane in 0..WIDTH {
-                            let difference = leaf.points[axis][lane] - centres[ball][axis];
-                            sum[lane] += difference * difference;
-                        }
-                    }
-                    for lane in 0..WIDTH {
-                        near[lane] |= sum[lane] < squares[ball];
-                    }
-                }
-                for lane in 0..WIDTH {
-                    if near[lane] {
-                        found.push(leaf.indices[lane]);
-                    }
-                }
-                continue;
-            }
             let boxes = &self.levels[level as usize - 1][node as usize];
-            for ball in 0..3 {
-                let distances = Self::distances(boxes, centres[ball]);
-                for lane in 0..WIDTH {
-                    near[lane] |= distances[lane] < squares[ball];
-                }
-            }
-            for lane in 0..WIDTH {
-                if near[lane] {
-                    stack[height] = (level - 1, node * WIDTH as u32 + lane as u32);
+            let distances = [
+                Self::distances::<V>(boxes, centres[0]),
+                Self::distances::<V>(boxes, centres[1]),
+                Self::distances::<V>(boxes, centres[2]),
+            ];
+            let mut near = contend(&distances, bounds);
+            while near != 0 {
+                let child = node * WIDTH as u32 + near.trailing_zeros();
+                near &= near - 1;
+                if level > 1 {
+                    stack[height] = (level - 1, child);
                     height += 1;
+                    continue;
+                }
+                let leaf = &self.leaves[child as usize];
+                let squares = [
+                    Self::squares::<V>(leaf, centres[0]),
+                    Self::squares::<V>(leaf, centres[1]),
+                    Self::squares::<V>(leaf, centres[2]),
+                ];
+                let mut inside = contend(&squares, bounds);
+                while inside != 0 {
+                    found.push(leaf.indices[inside.trailing_zeros() as usize]);
+                    inside &= inside - 1;
                 }
             }
         }
     }
 }
 
-/// Boxes in the level below `depth`, when there are `leaves` leaves.
-fn below_count(leaves: usize, depth: usize) -> usize {
-    (1..depth).fold(leaves, |count, _| count.div_ceil(WIDTH))
+/// The lanes that for every row of bounds are below one of its entries.
+#[inline(always)]
+fn contend<V: Vector>(squares: &[V; 3], bounds: &[[f64; 3]]) -> u8 {
+    let mut all = u8::MAX;
+    for bound in bounds {
+        let below = squares[0].less(V::constant(bound[0]))
+            | squares[1].less(V::constant(bound[1]))
+            | squares[2].less(V::constant(bound[2]));
+        all &= V::bits(below);
+    }
+    all
 }

@@ -430,9 +430,9 @@ fn edges(chunk: &mut Chunk, cut: &Cut<'_>, options: &Options<'_>, work: Work, no
         }
         let to = cut.polygon[if k + 1 == size { 0 } else { k + 1 }];
         let (du, dv) = (to.u - from.u, to.v - from.v);
-        let length = du.hypot(dv);
+        let length = (du * du + dv * dv).sqrt();
         let across = subtract(other.local, own.local);
-        let steepness = across[0].hypot(across[1]);
+        let steepness = (across[0] * across[0] + across[1] * across[1]).sqrt();
         if !(length > 0.0 && steepness > 0.0) {
             continue;
         }

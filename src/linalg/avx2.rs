@@ -146,4 +146,8 @@ impl Vector for Registers {
             _mm256_store_pd(start.add(4), self.1);
         }
     }
+    #[inline(always)]
+    fn bits(mask: Mask) -> u8 {
+        unsafe { (_mm256_movemask_pd(mask.0) | _mm256_movemask_pd(mask.1) << 4) as u8 }
+    }
 }

@@ -130,4 +130,12 @@ impl Vector for Register {
     fn store(self, lanes: &mut Lanes) {
         unsafe { _mm512_store_pd(lanes.0.as_mut_ptr(), self.0) }
     }
+    #[inline(always)]
+    fn bits(mask: Mask) -> u8 {
+        mask.0
+    }
+    #[inline(always)]
+    fn smallest(self) -> f64 {
+        unsafe { _mm512_reduce_min_pd(self.0) }
+    }
 }

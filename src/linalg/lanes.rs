@@ -20,6 +20,18 @@ impl Lanes {
 pub trait Vector: Real {
     fn load(lanes: &Lanes) -> Self;
     fn store(self, lanes: &mut Lanes);
+    /// Bit `i` tells of lane `i`.
+    fn bits(mask: Self::Mask) -> u8;
+
+    /// The smallest of the eight numbers, which must not be not-a-number.
+    #[inline(always)]
+    fn smallest(self) -> f64 {
+        let mut lanes = Lanes::ZERO;
+        self.store(&mut lanes);
+        let [a, b, c, d, e, f, g, h] = lanes.0;
+        let lower = |x: f64, y: f64| if y < x { y } else { x };
+        lower(lower(lower(a, b), lower(c, d)), lower(lower(e, f), lower(g, h)))
+    }
 }
 
 /// Loads every element of an array.
@@ -176,5 +188,9 @@ impl Vector for Lanes {
     #[inline(always)]
     fn store(self, lanes: &mut Lanes) {
         *lanes = self;
+    }
+    #[inline(always)]
+    fn bits(mask: LanesMask) -> u8 {
+        (0..WIDTH).fold(0, |bits, i| bits | u8::from(mask.0[i]) << i)
     }
 }

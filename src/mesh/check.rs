@@ -6,7 +6,7 @@
 
 use super::connectivity::{self, CROWDED, Facets, TETRAHEDRON_FACETS};
 use super::quality::scaled_jacobian;
-use super::{Mesh, TetrahedralMesh, TriangleMesh, area_vector, determinant, length, subtract};
+use super::{TetrahedralMesh, TriangleMesh, area_vector, determinant, length, subtract};
 
 /// What a problem means for a computation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -45,11 +45,11 @@ pub struct Problem {
 
 /// The problems found so far.
 #[derive(Default)]
-struct Problems(Vec<Problem>);
+pub(super) struct Problems(pub(super) Vec<Problem>);
 
 impl Problems {
     /// Adds a problem when `offenders` has any; `describe` gets their number and the first.
-    fn add(
+    pub(super) fn add(
         &mut self,
         kind: &'static str,
         severity: Severity,
@@ -73,24 +73,22 @@ impl Problems {
 }
 
 /// `"1 tetrahedron"`, `"3 tetrahedra"`.
-fn counted(count: usize, one: &str, many: &str) -> String {
+pub(super) fn counted(count: usize, one: &str, many: &str) -> String {
     format!("{count} {}", if count == 1 { one } else { many })
 }
 
 /// Names of a kind of cell: singular, plural.
-fn names<const N: usize>() -> (&'static str, &'static str) {
-    if N == 4 {
-        ("tetrahedron", "tetrahedra")
-    } else {
-        ("triangle", "triangles")
-    }
-}
+pub(super) type Names = (&'static str, &'static str);
 
 /// The checks that need no connectivity, in an order in which each may rely on those before. Returns whether cells and
 /// coordinates can be used further.
-fn elementary<const N: usize>(mesh: &Mesh<N>, problems: &mut Problems) -> bool {
-    let (one, many) = names::<N>();
-    let (vertices, cells) = (mesh.points.len(), mesh.cells.len());
+pub(super) fn elementary<const N: usize>(
+    points: &[[f64; 3]],
+    all: &[[u32; N]],
+    (one, many): Names,
+    problems: &mut Problems,
+) -> bool {
+    let (vertices, cells) = (points.len(), all.len());
     if cells == 0 {
         problems.add("empty", Severity::Error, Element::Mesh, std::iter::once(0), |_, _| {
             format!("the mesh has {vertices} vertices but no {many}; check that the file holds {many}")
@@ -107,7 +105,7 @@ fn elementary<const N: usize>(mesh: &Mesh<N>, problems: &mut Problems) -> bool {
         );
         return false;
     }
-    let infinite = (0..vertices).filter(|&vertex| !mesh.points[vertex].iter().all(|c| c.is_finite()));
+    let infinite = (0..vertices).filter(|&vertex| !points[vertex].iter().all(|c| c.is_finite()));
     let infinite = problems.add(
         "not-finite",
         Severity::Error,
@@ -120,27 +118,27 @@ fn elementary<const N: usize>(mesh: &Mesh<N>, problems: &mut Problems) -> bool {
             )
         },
     );
-    let beyond = (0..cells).filter(|&cell| mesh.cells[cell].iter().any(|&vertex| vertex as usize >= vertices));
+    let beyond = (0..cells).filter(|&cell| all[cell].iter().any(|&vertex| vertex as usize >= vertices));
     let beyond = problems.add("index-out-of-range", Severity::Error, Element::Cell, beyond, |count, first| {
         format!(
             "{count} of {cells} {many} name a vertex that does not exist, the first is {one} {first} with vertices {:?} \
              of {vertices} (counted from 0); is the file truncated or its vertices counted from another number?",
-            mesh.cells[first]
+            all[first]
         )
     });
     let repeats = |cell: &[u32; N]| (1..N).any(|i| cell[..i].contains(&cell[i]));
-    let repeated = (0..cells).filter(|&cell| repeats(&mesh.cells[cell]));
+    let repeated = (0..cells).filter(|&cell| repeats(&all[cell]));
     let repeated = problems.add("repeated-vertex", Severity::Error, Element::Cell, repeated, |count, first| {
         format!(
             "{count} of {cells} {many} use a vertex twice, the first is {one} {first} with vertices {:?}; remove them",
-            mesh.cells[first]
+            all[first]
         )
     });
     if infinite || beyond {
         return false;
     }
     let mut used = vec![false; vertices];
-    for &vertex in mesh.cells.iter().flatten() {
+    for &vertex in all.iter().flatten() {
         used[vertex as usize] = true;
     }
     let unused = (0..vertices).filter(|&vertex| !used[vertex]);
@@ -156,8 +154,7 @@ fn elementary<const N: usize>(mesh: &Mesh<N>, problems: &mut Problems) -> bool {
             )
         },
     );
-    let mut sorted: Vec<([u32; N], u32)> = mesh
-        .cells
+    let mut sorted: Vec<([u32; N], u32)> = all
         .iter()
         .zip(0..)
         .map(|(&cell, index)| {
@@ -182,13 +179,13 @@ fn elementary<const N: usize>(mesh: &Mesh<N>, problems: &mut Problems) -> bool {
             format!(
                 "{} the vertices of an earlier one, the first is {one} {first} with vertices {:?}; remove the copies",
                 counted(count, &format!("{one} has"), &format!("{many} have")),
-                mesh.cells[first]
+                all[first]
             )
         },
     );
     drop(sorted);
     let mut order: Vec<u32> = (0..vertices as u32).collect();
-    let key = |vertex: u32| mesh.points[vertex as usize].map(|coordinate| coordinate + 0.0);
+    let key = |vertex: u32| points[vertex as usize].map(|coordinate| coordinate + 0.0);
     let compare = |a: [f64; 3], b: [f64; 3]| {
         (0..3)
             .map(|axis| a[axis].total_cmp(&b[axis]))
@@ -214,7 +211,7 @@ fn elementary<const N: usize>(mesh: &Mesh<N>, problems: &mut Problems) -> bool {
 
 /// A volume below this multiple of the cube of the longest edge (an area below this multiple of its square) counts as
 /// zero: the rounding of the coordinates alone produces as much.
-const FLAT: f64 = 1e-15;
+pub(super) const FLAT: f64 = 1e-15;
 
 /// The longest distance between two of the points.
 fn longest<const N: usize>(corners: [[f64; 3]; N]) -> f64 {
@@ -257,7 +254,7 @@ fn folded(cells: &[[u32; 4]], facets: &Facets<4>) -> Vec<usize> {
 /// first in the list.
 pub fn tetrahedra(mesh: &mut TetrahedralMesh) -> Vec<Problem> {
     let mut problems = Problems::default();
-    if elementary(mesh, &mut problems) {
+    if elementary(&mesh.points, &mesh.cells, ("tetrahedron", "tetrahedra"), &mut problems) {
         shape_and_orientation(mesh, &mut problems);
     }
     let mut problems = problems.0;
@@ -407,7 +404,7 @@ fn shape_and_orientation(mesh: &mut TetrahedralMesh, problems: &mut Problems) {
 /// first in the list.
 pub fn triangles(mesh: &TriangleMesh) -> Vec<Problem> {
     let mut problems = Problems::default();
-    if elementary(mesh, &mut problems) {
+    if elementary(&mesh.points, &mesh.cells, ("triangle", "triangles"), &mut problems) {
         let total = mesh.cells.len();
         let flat = |&cell: &usize| {
             let corners = mesh.corners(mesh.cells[cell]);

@@ -1,4 +1,5 @@
-//! Meshes in flat arrays: triangle surfaces and tetrahedral volumes, their connectivity, generators, readers and writers.
+//! Meshes in flat arrays: triangle and quadrilateral surfaces, tetrahedral and mixed volumes, their connectivity, generators,
+//! readers and writers.
 //!
 //! Nothing here opens a file: readers take bytes, writers take `std::io::Write`.
 
@@ -6,9 +7,15 @@ pub mod connectivity;
 pub mod quality;
 pub mod split;
 pub mod check;
+pub mod quadrilateral;
 pub mod mixed;
 pub mod summary;
+pub mod linear_map;
+pub mod surface;
+pub mod catmull_clark;
 pub mod generate;
+pub mod planar;
+pub mod band;
 pub mod target;
 pub mod template;
 pub mod format;

@@ -7,6 +7,10 @@ pub mod setting;
 pub mod model;
 pub mod volume_map;
 pub mod volume_fit;
+pub mod surface_fit;
+pub mod centroidal_voronoi;
+pub mod g1_surface;
+pub mod mixed_fem;
 
 use crate::metric::Metric;
 use crate::optimize::Observer;
@@ -77,6 +81,11 @@ pub trait Method: Sync {
     }
     /// The metrics that every record of this method holds.
     fn metrics(&self) -> &'static [Metric];
+    /// Settings and axes across which values of this metric mean different things, such as energies of different
+    /// densities: no table calls one of them the best.
+    fn incomparable(&self, _metric: &str) -> &'static [&'static str] {
+        &[]
+    }
     /// Names and meanings of the columns in [`Outcome::traces`], such as `iteration` and `energy`.
     fn traces(&self) -> &'static [(&'static str, &'static str)] {
         &[]
@@ -90,7 +99,14 @@ pub trait Method: Sync {
 
 /// Every method, in the order of the documentation.
 pub fn methods() -> &'static [&'static dyn Method] {
-    &[&volume_map::VolumeMap, &volume_fit::VolumeFit]
+    &[
+        &volume_map::VolumeMap,
+        &volume_fit::VolumeFit,
+        &surface_fit::SurfaceFit,
+        &centroidal_voronoi::CentroidalVoronoi,
+        &g1_surface::G1Surface,
+        &mixed_fem::MixedFem,
+    ]
 }
 
 /// The method of this name.

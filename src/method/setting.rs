@@ -2,6 +2,8 @@
 //!
 //! One declaration serves the diagnostics, the defaults, the key, `vargeo schema` and `vargeo list settings`.
 
+use serde_json::{Map, Value};
+
 /// A named entry of a table in the experiment file.
 #[derive(Debug)]
 pub struct Field {
@@ -59,4 +61,26 @@ pub enum Default {
     Text(&'static str),
     /// A table filled with its fields' own defaults.
     Fields,
+}
+
+/// The given table with declared defaults where it is silent, recursively.
+pub fn fill(fields: &[Field], given: &Value) -> Map<String, Value> {
+    let mut table = Map::new();
+    for field in fields {
+        let present = given.get(field.name);
+        let value = match (&field.kind, &field.default, present) {
+            (Kind::Table(inner), _, Some(value)) => Some(Value::Object(fill(inner, value))),
+            (_, _, Some(value)) => Some(value.clone()),
+            (Kind::Table(inner), Default::Fields, None) => Some(Value::Object(fill(inner, &Value::Null))),
+            (_, Default::Boolean(value), None) => Some(Value::from(*value)),
+            (_, Default::Integer(value), None) => Some(Value::from(*value)),
+            (_, Default::Number(value), None) => Some(Value::from(*value)),
+            (_, Default::Text(value), None) => Some(Value::from(*value)),
+            _ => None,
+        };
+        if let Some(value) = value {
+            table.insert(field.name.to_string(), value);
+        }
+    }
+    table
 }

@@ -90,7 +90,7 @@ pub const METRICS: &[Metric] = &[
         "N_inv",
         Some(0.0),
         Better::Lower,
-        "Number of tetrahedra with a negative determinant.",
+        "Number of tetrahedra whose determinant is not positive.",
     ),
     metric(
         "degenerate",
@@ -218,7 +218,8 @@ pub fn distortion(source: &TetrahedralMesh, image: &[[f64; 3]], ratio: f64) -> R
         d_mv: defined(largest(&volume_distortion)),
         d_av_rescaled: defined(average(&rescaled)),
         d_mv_rescaled: defined(largest(&rescaled)),
-        inverted: determinant.iter().filter(|&&determinant| determinant < 0.0).count(),
+        // Not-a-number counts too.
+        inverted: determinant.iter().filter(|&&determinant| !(determinant > 0.0)).count(),
         degenerate: cells.iter().filter(|cell| cell.flat).count(),
         min_determinant: -largest(
             &determinant

@@ -90,7 +90,14 @@ impl Lbfgs {
             if let Some(reason) = before.and_then(|before| self.stopping.change(before, value)) {
                 break (StopReason::Converged, reason);
             }
-            two_loops(objective, &pairs, &gradient, &mut direction, &mut coefficients, &mut ahead);
+            two_loops(
+                objective,
+                &pairs,
+                &gradient,
+                &mut direction,
+                &mut coefficients,
+                &mut ahead,
+            );
             let slope = dot(&gradient, &direction);
             if slope < 0.0
                 && let Some(reason) = self.stopping.decrement(slope, value)

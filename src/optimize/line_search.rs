@@ -38,7 +38,13 @@ pub struct Backtracking {
     pub trials: u32,
     /// Accepted only if the gradient's norm does not grow either.
     pub gradient_decrease: bool,
+    /// A first trial that lowers the energy almost as the slope promises is doubled as long as that helps: the model of
+    /// the Hessian is then much too stiff, as one is that has lost its negative eigenvalues.
+    pub grow: bool,
 }
+
+/// Share of the slope's promise from which on a longer step is tried. A quadratic keeps half of it at its minimum.
+const PROMISING: f64 = 0.75;
 
 impl Default for Backtracking {
     fn default() -> Self {
@@ -47,6 +53,7 @@ impl Default for Backtracking {
             shrink: 0.5,
             trials: 60,
             gradient_decrease: false,
+            grow: false,
         }
     }
 }
@@ -70,7 +77,7 @@ impl Backtracking {
         }
         let before = norm(start.gradient);
         let mut length = first_length(objective, &start);
-        for _ in 0..self.trials {
+        for trial in 0..self.trials {
             advance(&start, length, point);
             *evaluations += 1;
             let value = objective.value(point);
@@ -80,11 +87,15 @@ impl Backtracking {
                     return None;
                 }
                 if !self.gradient_decrease {
-                    return Some(Step {
+                    let mut step = Step {
                         length,
                         value,
                         has_gradient: false,
-                    });
+                    };
+                    if self.grow && trial == 0 {
+                        step = grow(objective, &start, slope, step, point, evaluations);
+                    }
+                    return Some(step);
                 }
                 *evaluations += 1;
                 let value = objective.gradient(point, gradient);
@@ -100,6 +111,35 @@ impl Backtracking {
         }
         None
     }
+}
+
+/// Doubles an accepted step while the energy keeps falling almost as the slope promises. `point` is the one returned.
+fn grow(
+    objective: &mut (impl Objective + ?Sized),
+    start: &Start<'_>,
+    slope: f64,
+    first: Step,
+    point: &mut [f64],
+    evaluations: &mut u64,
+) -> Step {
+    let promising = |step: &Step| start.value - step.value >= -PROMISING * step.length * slope;
+    if !promising(&first) {
+        return first;
+    }
+    let limit = SAFETY * objective.max_step(start.x, start.direction);
+    let mut step = first;
+    while promising(&step) && 2.0 * step.length <= limit {
+        let length = 2.0 * step.length;
+        advance(start, length, point);
+        *evaluations += 1;
+        let value = objective.value(point);
+        if !value.is_finite() || value >= step.value {
+            advance(start, step.length, point);
+            break;
+        }
+        step = Step { length, value, ..step };
+    }
+    step
 }
 
 /// Bracketing and zooming until the strong Wolfe conditions hold (Nocedal and Wright 2006, algorithms 3.5 and 3.6).

@@ -61,6 +61,9 @@ impl Observer for Silent {
     }
 }
 
+/// The share of a Newton step from which on a small change of the energy means convergence.
+pub(crate) const LONG_STEP: f64 = 0.5;
+
 /// A function to minimize. Outside its domain its value is positive infinity.
 pub trait Objective {
     /// Number of unknowns.

@@ -3,7 +3,9 @@
 //! Guaranteed: the energy never increases, and every iterate has a finite value. Not guaranteed: a global minimum.
 
 use super::line_search::{Backtracking, Start};
-use super::{Counters, Iterate, NewtonObjective, NoDirection, Observer, Solution, StopReason, Stopping, dot, norm};
+use super::{
+    Counters, Iterate, LONG_STEP, NewtonObjective, NoDirection, Observer, Solution, StopReason, Stopping, dot, norm,
+};
 
 pub(super) const SUMMARY: &str =
     "projected Newton: positive model Hessian, sparse Cholesky, backtracking (Teran et al. 2005; Smith et al. 2019)";
@@ -97,7 +99,10 @@ impl Newton {
                 .search(objective, start, &mut point, &mut spare, &mut counters.evaluations)
             {
                 Some(accepted) => {
-                    let change = self.stopping.change(value, accepted.value);
+                    // A step cut short changes the energy by little wherever it is taken: it proves nothing.
+                    let change = (accepted.length >= LONG_STEP)
+                        .then(|| self.stopping.change(value, accepted.value))
+                        .flatten();
                     std::mem::swap(&mut x, &mut point);
                     step = accepted.length;
                     counters.iterations += 1;

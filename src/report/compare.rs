@@ -1,6 +1,7 @@
 //! Two result sets side by side: each figure of each job that both have, with its difference.
 
 use super::number::round;
+use crate::experiment::record::MEASUREMENTS;
 use std::fmt::Write;
 
 /// A `jobs.csv` as read back.
@@ -24,9 +25,6 @@ const WORDS: &[&str] = &[
     "key",
     "threads",
 ];
-
-/// Columns whose differences are those of machines and moments: shown, never counted.
-const MEASUREMENTS: &[&str] = &["seconds", "cpu_seconds", "peak_memory"];
 
 impl Sheet {
     /// Reads a `jobs.csv`.
@@ -94,8 +92,9 @@ impl Comparison {
     }
 }
 
-/// Compares by job name and column name.
-pub fn compare(left: &Sheet, right: &Sheet) -> Comparison {
+/// Compares by job name and column name. Numbers whose relative difference is at most `tolerance` count as equal; with
+/// `columns`, only those are looked at.
+pub fn compare(left: &Sheet, right: &Sheet, tolerance: f64, columns: &[String]) -> Comparison {
     let missing = |from: &[String], other: &[String]| -> Vec<String> {
         from.iter().filter(|name| !other.contains(name)).cloned().collect()
     };
@@ -117,18 +116,21 @@ pub fn compare(left: &Sheet, right: &Sheet) -> Comparison {
             let Some(index) = right.head.iter().position(|name| name == column) else {
                 continue;
             };
-            if WORDS.contains(&bare) {
+            let wanted = columns.is_empty() || columns.iter().any(|column| column == bare);
+            if WORDS.contains(&bare) || !wanted {
                 continue;
             }
-            let measured = MEASUREMENTS.contains(&bare);
-            if *value == other[index] {
-                comparison.equal += usize::from(!measured);
-                continue;
-            }
+            // Differences of machines and moments are shown, never counted.
+            let measured = MEASUREMENTS.iter().any(|measured| measured.name == bare);
             let relative = match (value.parse::<f64>(), other[index].parse::<f64>()) {
                 (Ok(left), Ok(right)) if left != 0.0 => Some((right - left) / left.abs()),
                 _ => None,
             };
+            let near = !measured && relative.is_some_and(|relative| relative.abs() <= tolerance);
+            if *value == other[index] || near {
+                comparison.equal += usize::from(!measured);
+                continue;
+            }
             comparison.differences.push(Difference {
                 job: job[0].clone(),
                 column: column.clone(),
@@ -147,10 +149,11 @@ pub fn describe(comparison: &Comparison, left: &str, right: &str) -> String {
     let mut text = String::new();
     let _ = writeln!(
         text,
-        "{} jobs in both; {} results equal, {} different",
+        "{} jobs in both; {} results equal, {} different; {} jobs in one only",
         comparison.jobs,
         comparison.equal,
-        comparison.results().count()
+        comparison.results().count(),
+        comparison.only_left.len() + comparison.only_right.len()
     );
     for (title, measured) in [("results", false), ("measurements", true)] {
         let chosen: Vec<&Difference> = comparison
@@ -188,11 +191,10 @@ pub fn describe(comparison: &Comparison, left: &str, right: &str) -> String {
         ("columns", right, &comparison.columns_right),
     ] {
         if !names.is_empty() {
-            let _ = writeln!(
-                text,
-                "\nonly {side} has the {what} {}",
-                super::table::terminal::plain(&names.join(", "))
-            );
+            let _ = writeln!(text, "\nonly {side} has {} {what}:", names.len());
+            for name in names {
+                let _ = writeln!(text, "  {}", super::table::terminal::plain(name));
+            }
         }
     }
     text

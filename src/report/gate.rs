@@ -103,6 +103,10 @@ fn judge_expectation(experiment: &Experiment, expectation: &Expectation, rows: &
             };
             let partners = partners(row, &comparison.other, rows);
             if partners.is_empty() {
+                // Without a condition of its own, the expectation speaks of the other jobs only.
+                if row.matches(&comparison.other) {
+                    continue;
+                }
                 push(
                     format!(
                         "{} less than {factor}that with {}",

@@ -57,8 +57,9 @@ pub struct Written {
     pub verdicts: Vec<gate::Verdict>,
 }
 
-/// Writes everything into `folder`, which is made where it is missing.
-pub fn write(experiment: &Experiment, rows: &[Row], folder: &Path) -> Result<Written, ReportError> {
+/// Writes everything into `folder`, which is made where it is missing. `planned` is the number of jobs of the experiment, of
+/// which `rows` are those with a record.
+pub fn write(experiment: &Experiment, rows: &[Row], planned: usize, folder: &Path) -> Result<Written, ReportError> {
     std::fs::create_dir_all(folder).map_err(|error| ReportError::Write(folder.into(), error))?;
     let mut files = Vec::new();
     let mut publish = |name: &str, bytes: &[u8]| -> Result<(), ReportError> {
@@ -88,7 +89,7 @@ pub fn write(experiment: &Experiment, rows: &[Row], folder: &Path) -> Result<Wri
         publish(&format!("{}.png", plot.name), &plot::bitmap::write(&chart)?)?;
         drawings.push(chart);
     }
-    let page = page::write(experiment, rows, &fits, &verdicts, &drawings)?;
+    let page = page::write(experiment, rows, planned, &fits, &verdicts, &drawings)?;
     publish("index.html", page.as_bytes())?;
     Ok(Written {
         page: folder.join("index.html"),

@@ -61,9 +61,18 @@ pub fn fit(points: &[(f64, f64)]) -> Option<Line> {
     })
 }
 
-/// A rate to two decimals.
-pub fn shown(rate: f64) -> String {
-    format!("{rate:.2}")
+/// A rate to two decimals, or to as many as its standard error's second digit needs, up to four.
+pub fn shown(rate: f64, standard_error: Option<f64>) -> String {
+    let decimals = match standard_error {
+        Some(error) if error > 0.0 && error < 0.1 => (1 - error.log10().floor() as i32).clamp(2, 4) as usize,
+        _ => 2,
+    };
+    let text = format!("{rate:.decimals$}");
+    // No sign on what rounds to zero.
+    match text.strip_prefix('-') {
+        Some(digits) if !digits.contains(|digit: char| ('1'..='9').contains(&digit)) => digits.to_string(),
+        _ => text,
+    }
 }
 
 /// Every rate of the experiment, a fit for each series in the order of the jobs.
@@ -187,7 +196,7 @@ impl Fit {
         let mut text = format!("{} against {}{series}: ", self.y, self.x);
         match self.line {
             Some(line) => {
-                text.push_str(&format!("slope {}", shown(line.slope)));
+                text.push_str(&format!("slope {}", shown(line.slope, line.standard_error)));
                 if let Some(error) = line.standard_error {
                     text.push_str(&format!(" \u{b1} {}", round(error, 2).plain()));
                 }
@@ -196,10 +205,14 @@ impl Fit {
             None => text.push_str(&format!("no slope from {} points", self.points.len())),
         }
         if let Some(last) = self.last_pair {
-            text.push_str(&format!("; last pair {}", shown(last)));
+            text.push_str(&format!("; last pair {}", shown(last, None)));
         }
         if let Some((low, high, count)) = self.spread {
-            text.push_str(&format!("; {} to {} over {count} seeds", shown(low), shown(high)));
+            text.push_str(&format!(
+                "; {} to {} over {count} seeds",
+                shown(low, None),
+                shown(high, None)
+            ));
         }
         if let Some([low, high]) = self.window {
             text.push_str(&format!(
@@ -210,7 +223,10 @@ impl Fit {
             ));
         }
         if self.left_out > 0 {
-            text.push_str(&format!("; {} jobs without usable figures", self.left_out));
+            text.push_str(&format!(
+                "; {} jobs left out: without a figure, or with one that is not positive and has no logarithm",
+                self.left_out
+            ));
         }
         text
     }

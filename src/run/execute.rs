@@ -181,11 +181,15 @@ pub fn execute(
         let (stopped, phases) = recorder.finish();
         times.push(Times { wall, cpu, phases });
         // A method that was asked to stop may have ended in any way: what it returned depends on the clock.
-        if stopped == Some(StopReason::Cancelled) || bounds.interrupt.is_set() {
+        let cancelled = matches!(stopped, Some((StopReason::Cancelled, _)));
+        if cancelled || bounds.interrupt.is_set() {
             return Ending::Cancelled;
         }
         let (result, mesh) = match returned {
-            _ if stopped.is_some() => (time_limit(bounds.seconds, &times), None),
+            _ if stopped.is_some() => (
+                time_limit(bounds.seconds, stopped.as_ref().map_or("", |(_, phase)| phase)),
+                None,
+            ),
             Ok(Ok(outcome)) => done(outcome),
             Ok(Err(refusal)) => {
                 let refused = JobResult {
@@ -256,9 +260,13 @@ fn done(outcome: Outcome) -> (JobResult, Option<Vec<u8>>) {
     (result, mesh)
 }
 
-fn time_limit(seconds: Option<f64>, times: &[Times]) -> JobResult {
-    let last = times.last().and_then(|times| times.phases.last());
-    let phase = last.map_or_else(String::new, |phase| format!(" in phase {}", phase.name));
+/// `phase` may be empty, where the method named none.
+fn time_limit(seconds: Option<f64>, phase: &str) -> JobResult {
+    let phase = if phase.is_empty() {
+        String::new()
+    } else {
+        format!(" in phase {phase}")
+    };
     let limit = seconds.unwrap_or_default();
     failure(
         "time-limit",
@@ -273,7 +281,8 @@ struct Recorder<'a> {
     running: Option<(usize, Instant, f64)>,
     interrupt: &'a Interrupt,
     deadline: Option<Instant>,
-    stopped: Cell<Option<StopReason>>,
+    /// Why the method was asked to stop, and the index of the phase that ran then.
+    stopped: Cell<Option<(StopReason, usize)>>,
     tell: &'a mut (dyn FnMut(Message) + Send),
     told: Option<Instant>,
     phase_told: Option<Instant>,
@@ -305,9 +314,12 @@ impl<'a> Recorder<'a> {
         }
     }
 
-    fn finish(mut self) -> (Option<StopReason>, Vec<Phase>) {
+    /// Why and in which phase the method was asked to stop, and what the phases took.
+    fn finish(mut self) -> (Option<(StopReason, String)>, Vec<Phase>) {
         self.close();
-        (self.stopped.get(), self.phases)
+        let name = |phase: usize| self.phases.get(phase).map_or(String::new(), |phase| phase.name.clone());
+        let stopped = self.stopped.get().map(|(reason, phase)| (reason, name(phase)));
+        (stopped, self.phases)
     }
 }
 
@@ -345,13 +357,14 @@ impl Observer for Recorder<'_> {
 
     fn stop(&self) -> Option<StopReason> {
         if self.stopped.get().is_none() {
+            let phase = self.running.map_or(usize::MAX, |(index, ..)| index);
             if self.interrupt.is_set() {
-                self.stopped.set(Some(StopReason::Cancelled));
+                self.stopped.set(Some((StopReason::Cancelled, phase)));
             } else if self.deadline.is_some_and(|deadline| Instant::now() >= deadline) {
-                self.stopped.set(Some(StopReason::TimeLimit));
+                self.stopped.set(Some((StopReason::TimeLimit, phase)));
             }
         }
-        self.stopped.get()
+        self.stopped.get().map(|(reason, _)| reason)
     }
 }
 

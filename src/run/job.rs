@@ -209,9 +209,15 @@ fn compute(
             kept,
             set_aside,
         }) => {
+            let (made, now) = (&kept.measurement.commit, provenance::commit());
+            let cause = if made == now {
+                "is not deterministic".to_string()
+            } else {
+                format!("differs from that of another build, commit {made} against {now}, or is not deterministic")
+            };
             tell(Message::Warning(format!(
-                "{} is not deterministic: the stored result has the fingerprint {stored}, this computation {computed} \
-                 on {}; the one not kept is in {}",
+                "{} {cause}: the stored result has the fingerprint {stored}, this computation {computed} on {}; the one \
+                 not kept is in {}",
                 request.key.0,
                 provenance::target(),
                 set_aside.display()

@@ -47,6 +47,8 @@ pub struct Axes {
     pub known: Vec<Known>,
     pub vary: Vec<Axis>,
     pub zips: Vec<Vec<Axis>>,
+    /// Names of the method's settings, which may be meant where an axis is asked for.
+    settings: Vec<&'static str>,
 }
 
 impl Axes {
@@ -164,7 +166,10 @@ pub fn read(
     models: &[Model],
     broken_models: &BTreeSet<String>,
 ) -> Axes {
-    let mut axes = Axes::default();
+    let mut axes = Axes {
+        settings: method.settings().iter().map(|field| field.name).collect(),
+        ..Axes::default()
+    };
     let all: Vec<&Named<'_>> = vary.iter().chain(zips.iter().flatten()).collect();
     let model_axis = all.iter().find(|axis| axis.name == "model");
     let listed: Option<Vec<String>> = model_axis.and_then(|axis| match &axis.node.content {
@@ -306,15 +311,22 @@ fn resolve(checker: &mut Checker, method: &'static dyn Method, axis: &Named<'_>)
     }
     let mut known = paths(method.settings());
     known.insert(0, "model".to_owned());
+    for role in method.model().roles {
+        let parameters = role.generators.iter().flat_map(|generator| generator.parameters);
+        known.extend(parameters.map(|field| format!("model.{}.{}", role.name, field.name)));
+    }
+    known.sort();
+    known.dedup();
     let meant = nearest(&axis.name, known.iter().map(String::as_str)).map(str::to_owned);
     let deeper = known.iter().find(|path| path.ends_with(&format!(".{}", axis.name)));
+    let meant = meant.filter(|_| deeper.is_none());
     let diagnostic = checker.error(
         axis.span.clone(),
         format!("axis \"{}\" names no setting of {}", axis.name, method.name()),
     );
     diagnostic.help = match (&meant, deeper) {
-        (None, Some(path)) => Some(format!("did you mean \"{path}\"?")),
-        _ => suggestion(&axis.name, known.iter().map(String::as_str)),
+        (_, Some(path)) => Some(format!("did you mean \"{path}\"?")),
+        (_, None) => suggestion(&axis.name, known.iter().map(String::as_str)),
     };
     (None, meant.or_else(|| deeper.cloned()))
 }
@@ -400,7 +412,14 @@ fn parameter_kinds(
                 let message = format!("axis \"{}\" does not fit model \"{}\"", axis.name, model.name);
                 let diagnostic = checker.error(axis.span.clone(), message);
                 diagnostic.label = reason.label;
-                diagnostic.help = reason.help;
+                // A parameter of another role, such as the target's, is named in full.
+                let other = method.model().roles.iter().find(|other| {
+                    other.name != role && models::generator_parameter(method, model, other.name, name).is_ok()
+                });
+                diagnostic.help = match other {
+                    Some(other) => Some(format!("did you mean \"model.{}.{name}\"?", other.name)),
+                    None => reason.help,
+                };
             }
         }
     }
@@ -524,8 +543,14 @@ pub fn checked_value(checker: &mut Checker, item: &Node, axis: &Known) -> Option
 pub fn unknown_axis(checker: &mut Checker, span: Range<usize>, name: &str, axes: &Axes) {
     let known: Vec<&str> = axes.names().collect();
     let diagnostic = checker.error(span, format!("unknown axis \"{name}\""));
-    diagnostic.help =
-        suggestion(name, known).or_else(|| Some("this file has no axes; add them under [vary]".to_owned()));
+    let first = name.split('.').next().unwrap_or(name);
+    diagnostic.help = if axes.settings.contains(&first) {
+        Some(format!(
+            "\"{name}\" is a setting that does not vary; give it values under [vary]"
+        ))
+    } else {
+        suggestion(name, known).or_else(|| Some("this file has no axes; add them under [vary]".to_owned()))
+    };
 }
 
 /// Axis names: one, or a list.

@@ -148,7 +148,10 @@ fn column_expectation(checker: &mut Checker, entry: &Entry, context: &Context<'_
 /// The condition that tells the other jobs of each comparison: those that have its values and agree in every other axis.
 fn other_job(checker: &mut Checker, node: &Node, context: &Context<'_>, these: &Condition) -> Option<Condition> {
     let other = super::axes::condition(checker, node, "less_than", context.axes)?;
-    for point in context.points.iter().filter(|point| grid::matches(these, point)) {
+    let chosen = || context.points.iter().filter(|point| grid::matches(these, point));
+    // The others themselves are compared with nothing, unless the expectation speaks of no other job.
+    let only_others = chosen().all(|point| grid::matches(&other, point));
+    for point in chosen().filter(|point| only_others || !grid::matches(&other, point)) {
         let agree = |candidate: &Point| {
             let pairs = candidate.iter().zip(point);
             pairs

@@ -14,6 +14,7 @@ use super::diagnostic::{Diagnostic, Severity, Source};
 use super::document::{self, Content, Entry, Node, Table};
 use super::file::{Condition, Experiment, Limits, Model, Origin, Timing};
 use super::grid::{self, Point};
+use super::nearest::nearest;
 use super::section::{EXPERIMENT, Holds, Key};
 use crate::method::Method;
 use axes::{Axes, Sets};
@@ -245,6 +246,9 @@ fn method(checker: &mut Checker, file: &Table, methods: &[&'static dyn Method]) 
     let found = methods.iter().copied().find(|method| method.name() == name);
     if found.is_none() {
         checker.unknown_name(entry.value.span.clone(), "method", &name, names());
+        // The rest is checked by the method that was probably meant.
+        let meant = nearest(&name, names());
+        return methods.iter().copied().find(|method| Some(method.name()) == meant);
     }
     found
 }

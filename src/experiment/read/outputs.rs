@@ -43,12 +43,31 @@ fn table(checker: &mut Checker, node: &Node, context: &Context<'_>, names: &mut 
         .nodes
         .get("columns")
         .map_or_else(Vec::new, |entry| columns(checker, &entry.value, context));
+    let across = match found.nodes.get("across") {
+        Some(entry) => axes::axis_names(checker, &entry.value, "across", context.axes),
+        None => Vec::new(),
+    };
     let rows = match found.nodes.get("rows") {
         Some(entry) => axes::axis_names(checker, &entry.value, "rows", context.axes),
-        None => varying(context, None),
+        None => {
+            let all = varying(context, None).into_iter();
+            all.filter(|axis| !across.contains(axis)).collect()
+        }
     };
+    if let (Some(entry), Some(twice)) = (
+        found.nodes.get("across"),
+        across.iter().find(|axis| rows.contains(axis)),
+    ) {
+        checker
+            .error(
+                entry.value.span.clone(),
+                format!("axis \"{twice}\" is both in \"rows\" and \"across\""),
+            )
+            .help = Some("leave it in one of the two".to_owned());
+    }
     if let Some(entry) = found.nodes.get("rows") {
-        indistinct(checker, entry, context, &condition, &rows);
+        let told: Vec<String> = rows.iter().chain(&across).cloned().collect();
+        indistinct(checker, entry, context, &condition, &told);
     }
     let published = found
         .nodes
@@ -59,6 +78,7 @@ fn table(checker: &mut Checker, node: &Node, context: &Context<'_>, names: &mut 
         name,
         rows,
         columns,
+        across,
         condition,
         published,
     })

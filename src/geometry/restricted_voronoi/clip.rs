@@ -3,12 +3,23 @@
 //! On the triangle's plane the squared distance to a site differs from that to a reference site by an affine function, the
 //! site's *height function* `W_i`. The cell of site `i` is where `W_i` is smallest: a convex polygon, cut from the triangle
 //! by the lines `W_i = W_j`. A constant added to a squared distance (a power diagram) changes nothing in this.
+//!
+//! A polygon starts as the whole triangle. At a vertex where another height function is lower than the owner's, the lowest
+//! one cuts the polygon; when no vertex is left with a lower one, the polygon is the cell, by convexity. Finding the lowest
+//! of eight functions takes a handful of vector instructions, so that no order of the neighbours and no security radius is
+//! needed.
 
 use super::frame::Frame;
+use crate::linalg::lanes::{Lanes, Vector, WIDTH};
 
 /// What lies across an edge of a polygon: an edge of the triangle (`-1 - k` for the edge from corner `k` to `k + 1`) or a
 /// candidate.
 pub(crate) type Mark = i32;
+
+/// No site is known that is lower at the vertex than the owner.
+const UNKNOWN: i32 = -2;
+/// The owner is lowest at the vertex.
+const SETTLED: i32 = -1;
 
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Corner {
@@ -16,6 +27,8 @@ pub(crate) struct Corner {
     pub(crate) v: f64,
     /// Mark of the edge that leaves the vertex.
     pub(crate) mark: Mark,
+    /// A lower candidate, or one of the constants above.
+    pub(super) rival: i32,
 }
 
 /// A site that may own a part of the triangle.
@@ -30,69 +43,230 @@ pub(crate) struct Candidate {
     pub(crate) offset: f64,
 }
 
-/// Working memory for one triangle at a time.
+/// Height functions, eight side by side.
 #[derive(Debug, Default)]
-pub(crate) struct Clipper {
-    pub(crate) candidates: Vec<Candidate>,
+pub(super) struct Heights {
+    groups: Vec<[Lanes; 3]>,
+    count: usize,
+}
+
+impl Heights {
+    pub(super) fn clear(&mut self) {
+        self.groups.clear();
+        self.count = 0;
+    }
+
+    #[inline(always)]
+    pub(super) fn push(&mut self, height: [f64; 3]) {
+        let lane = self.count % WIDTH;
+        if lane == 0 {
+            // Absent functions are infinite everywhere.
+            self.groups
+                .push([Lanes::ZERO, Lanes::ZERO, Lanes([f64::INFINITY; WIDTH])]);
+        }
+        if let Some(group) = self.groups.last_mut() {
+            for k in 0..3 {
+                group[k].0[lane] = height[k];
+            }
+        }
+        self.count += 1;
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.count
+    }
+
+    #[inline(always)]
+    pub(super) fn get(&self, index: usize) -> [f64; 3] {
+        let group = &self.groups[index / WIDTH];
+        std::array::from_fn(|k| group[k].0[index % WIDTH])
+    }
+
+    /// The smallest value at a point, and the first function that takes it.
+    #[inline(always)]
+    pub(super) fn lowest<V: Vector>(&self, u: f64, v: f64) -> (f64, usize) {
+        let (u, v) = (V::constant(u), V::constant(v));
+        let mut best = value(&self.groups[0], u, v);
+        let mut place = V::constant(0.0);
+        let mut index = 1.0;
+        for group in &self.groups[1..] {
+            let value = value(group, u, v);
+            let lower = value.less(best);
+            best = V::select(lower, value, best);
+            place = V::select(lower, V::constant(index), place);
+            index += 1.0;
+        }
+        let smallest = best.smallest();
+        // Not above the smallest.
+        let lane = (!V::bits(V::constant(smallest).less(best))).trailing_zeros() as usize;
+        if self.groups.len() == 1 {
+            return (smallest, lane);
+        }
+        let mut places = Lanes::ZERO;
+        place.store(&mut places);
+        (smallest, places.0[lane % WIDTH] as usize * WIDTH + lane)
+    }
+}
+
+// No closure: it would not inherit the instruction set.
+#[inline(always)]
+fn value<V: Vector>(group: &[Lanes; 3], u: V, v: V) -> V {
+    V::load(&group[0]) * u + V::load(&group[1]) * v + V::load(&group[2])
+}
+
+/// Convex polygons of one triangle in a flat array.
+#[derive(Debug, Default)]
+pub(super) struct Polygons {
+    pub(super) corners: Vec<Corner>,
+    /// Owner, first corner and end of every polygon.
+    pub(super) parts: Vec<(u32, u32, u32)>,
+    /// Sum of the polygons' areas.
+    pub(super) area: f64,
+}
+
+impl Polygons {
+    pub(super) fn clear(&mut self) {
+        self.corners.clear();
+        self.parts.clear();
+        self.area = 0.0;
+    }
+
+    #[inline(always)]
+    pub(super) fn push(&mut self, owner: usize, polygon: &[Corner]) {
+        let start = self.corners.len() as u32;
+        self.corners.extend_from_slice(polygon);
+        self.parts.push((owner as u32, start, self.corners.len() as u32));
+        let first = polygon[0];
+        let mut doubled = 0.0;
+        let (mut x, mut y) = (polygon[1].u - first.u, polygon[1].v - first.v);
+        for corner in &polygon[2..] {
+            let (a, b) = (corner.u - first.u, corner.v - first.v);
+            doubled += x * b - y * a;
+            (x, y) = (a, b);
+        }
+        self.area += 0.5 * doubled;
+    }
+}
+
+impl Polygons {
+    /// Adds a polygon that was cut among the functions `names`, and calls those by their names.
+    pub(super) fn push_renamed(&mut self, owner: usize, polygon: &[Corner], names: &[u32]) {
+        self.push(owner, polygon);
+        let start = self.corners.len() - polygon.len();
+        for corner in &mut self.corners[start..] {
+            if corner.mark >= 0 {
+                corner.mark = names[corner.mark as usize] as i32;
+            }
+        }
+    }
+}
+
+/// Memory for cutting one polygon.
+#[derive(Debug, Default)]
+pub(super) struct Clipper {
     polygon: Vec<Corner>,
     other: Vec<Corner>,
     signs: Vec<f64>,
 }
 
 impl Clipper {
-    /// The polygon of candidate `i`, counter-clockwise; empty when it owns nothing.
-    pub(crate) fn cell(&mut self, frame: &Frame, i: usize) -> &[Corner] {
-        self.polygon.clear();
-        for (k, &[u, v]) in frame.corners.iter().enumerate() {
-            self.polygon.push(Corner {
-                u,
-                v,
-                mark: -1 - k as i32,
-            });
+    /// The triangle itself, with the lowest functions at its corners.
+    #[inline(always)]
+    pub(super) fn corners<V: Vector>(frame: &Frame, heights: &Heights) -> [(Corner, f64); 3] {
+        let mut corners = Clipper::triangle(frame).map(|corner| (corner, 0.0));
+        for (corner, value) in &mut corners {
+            let (lowest, rival) = heights.lowest::<V>(corner.u, corner.v);
+            corner.rival = rival as i32;
+            *value = lowest;
         }
-        let own = self.candidates[i];
-        for j in 0..self.candidates.len() {
-            if j == i {
-                continue;
+        corners
+    }
+
+    /// The whole triangle as a polygon.
+    pub(super) fn triangle(frame: &Frame) -> [Corner; 3] {
+        std::array::from_fn(|k| Corner {
+            u: frame.corners[k][0],
+            v: frame.corners[k][1],
+            mark: -1 - k as i32,
+            rival: SETTLED,
+        })
+    }
+
+    /// The polygon of function `i`, counter-clockwise; empty when it owns nothing. A function must be lower by more than
+    /// `tolerance` to cut.
+    #[inline(always)]
+    pub(super) fn cell<V: Vector>(
+        &mut self,
+        corners: &[(Corner, f64); 3],
+        heights: &Heights,
+        i: usize,
+        tolerance: f64,
+    ) -> &[Corner] {
+        let own = heights.get(i);
+        let height = |function: [f64; 3], u: f64, v: f64| function[0] * u + function[1] * v + function[2];
+        self.polygon.clear();
+        for &(mut corner, value) in corners {
+            if value >= height(own, corner.u, corner.v) - tolerance {
+                corner.rival = SETTLED;
             }
-            let other = &self.candidates[j];
-            let [a, b, c] = std::array::from_fn(|k| own.height[k] - other.height[k]);
-            self.signs.clear();
-            self.signs
-                .extend(self.polygon.iter().map(|corner| a * corner.u + b * corner.v + c));
-            // Ties go to the smaller index, so that two sites with the same height function do not share a cell.
-            let outside = |sign: f64| sign > 0.0 || (sign == 0.0 && other.site < own.site);
-            let count = self.signs.iter().filter(|&&sign| outside(sign)).count();
-            if count == 0 {
-                continue;
-            }
-            if count == self.signs.len() {
-                self.polygon.clear();
-                break;
-            }
-            self.other.clear();
-            let size = self.polygon.len();
-            for k in 0..size {
-                let next = if k + 1 == size { 0 } else { k + 1 };
-                let (from, to) = (self.polygon[k], self.polygon[next]);
-                let (start, end) = (self.signs[k], self.signs[next]);
-                let out = outside(start);
-                if !out {
-                    self.other.push(from);
+            self.polygon.push(corner);
+        }
+        // Every round settles a vertex or cuts it off, and every function cuts once at most up to rounding.
+        let mut rounds = 4 * heights.len() + 8;
+        'search: while rounds > 0 {
+            rounds -= 1;
+            for k in 0..self.polygon.len() {
+                let corner = &mut self.polygon[k];
+                if corner.rival == SETTLED {
+                    continue;
                 }
-                if out != outside(end) {
-                    let t = start / (start - end);
-                    let t = if t >= 0.0 { t.min(1.0) } else { 0.0 };
-                    self.other.push(Corner {
-                        u: from.u + t * (to.u - from.u),
-                        v: from.v + t * (to.v - from.v),
-                        // Leaving the cell: the bisector follows. Entering it: the old edge goes on.
-                        mark: if out { from.mark } else { j as i32 },
-                    });
+                if corner.rival == UNKNOWN {
+                    let (value, rival) = heights.lowest::<V>(corner.u, corner.v);
+                    if value >= height(own, corner.u, corner.v) - tolerance {
+                        corner.rival = SETTLED;
+                        continue;
+                    }
+                    corner.rival = rival as i32;
                 }
+                let rival = corner.rival;
+                if !self.cut(own, heights.get(rival as usize), rival) {
+                    self.polygon.clear();
+                    break 'search;
+                }
+                continue 'search;
             }
-            std::mem::swap(&mut self.polygon, &mut self.other);
+            break;
         }
         &self.polygon
+    }
+
+    /// Cuts off where `other` is lower than `own`. False when nothing remains.
+    #[inline(always)]
+    fn cut(&mut self, own: [f64; 3], other: [f64; 3], mark: Mark) -> bool {
+        let [a, b, c] = [own[0] - other[0], own[1] - other[1], own[2] - other[2]];
+        self.signs.clear();
+        self.signs
+            .extend(self.polygon.iter().map(|corner| a * corner.u + b * corner.v + c));
+        self.other.clear();
+        let size = self.polygon.len();
+        let (mut from, mut start) = (self.polygon[size - 1], self.signs[size - 1]);
+        for (&to, &end) in self.polygon.iter().zip(&self.signs) {
+            if (start > 0.0) != (end > 0.0) {
+                let t = start / (start - end);
+                self.other.push(Corner {
+                    u: from.u + t * (to.u - from.u),
+                    v: from.v + t * (to.v - from.v),
+                    // Leaving the cell: the bisector follows. Entering it: the old edge goes on.
+                    mark: if start > 0.0 { from.mark } else { mark },
+                    rival: UNKNOWN,
+                });
+            }
+            if !(end > 0.0) {
+                self.other.push(to);
+            }
+            (from, start) = (to, end);
+        }
+        std::mem::swap(&mut self.polygon, &mut self.other);
+        self.polygon.len() >= 3
     }
 }

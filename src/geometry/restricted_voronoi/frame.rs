@@ -1,6 +1,7 @@
 //! A triangle in its own plane.
 
-use crate::mesh::{cross, dot, length, subtract};
+use crate::linalg::vector3::{cross, dot, times};
+use crate::mesh::{length, subtract};
 
 /// A triangle with an orthonormal frame: `x = origin + u tangents[0] + v tangents[1]` for points `x` of its plane.
 #[derive(Clone, Copy, Debug)]
@@ -19,24 +20,41 @@ pub(crate) struct Frame {
 
 impl Frame {
     /// `None` for a triangle without area or without finite coordinates.
+    #[inline(always)]
     pub(crate) fn new([a, b, c]: [[f64; 3]; 3]) -> Option<Frame> {
         let edges = [subtract(b, a), subtract(c, b), subtract(a, c)];
-        let lengths = edges.map(length);
-        let longest = (1..3).fold(0, |best, k| if lengths[k] > lengths[best] { k } else { best });
-        let diameter = lengths[longest];
-        let first = edges[longest].map(|x| x / diameter);
+        let squares = [
+            dot(edges[0], edges[0]),
+            dot(edges[1], edges[1]),
+            dot(edges[2], edges[2]),
+        ];
+        // The longest edge is the first axis.
+        let longest = if squares[0] >= squares[1] && squares[0] >= squares[2] {
+            0
+        } else if squares[1] >= squares[2] {
+            1
+        } else {
+            2
+        };
+        let diameter = squares[longest].sqrt();
+        let inverse = 1.0 / diameter;
         // Unit lengths before the product, so that no triangle is too small for it.
-        let side = edges[(longest + 1) % 3].map(|x| x / diameter);
+        let first = times(edges[longest], inverse);
+        let side = times(edges[if longest == 2 { 0 } else { longest + 1 }], inverse);
         let across = cross(first, side);
         let height = length(across);
-        // A triangle thinner than the rounding of its coordinates has no plane.
+        // A triangle without extent has no plane.
         if !(height > 0.0 && height.is_finite() && diameter * diameter * height > 0.0) {
             return None;
         }
-        let normal = across.map(|x| x / height);
+        let normal = times(across, 1.0 / height);
         let tangents = [first, cross(normal, first)];
-        let plane = |x: [f64; 3]| [dot(x, tangents[0]), dot(x, tangents[1])];
-        let corners = [[0.0; 2], plane(subtract(b, a)), plane(subtract(c, a))];
+        let (p, q) = (edges[0], times(edges[2], -1.0));
+        let corners = [
+            [0.0; 2],
+            [dot(p, tangents[0]), dot(p, tangents[1])],
+            [dot(q, tangents[0]), dot(q, tangents[1])],
+        ];
         let area = 0.5 * (corners[1][0] * corners[2][1] - corners[1][1] * corners[2][0]);
         (area > 0.0).then_some(Frame {
             origin: a,
@@ -57,7 +75,12 @@ impl Frame {
     /// The vector of space with coordinates `x` in the frame.
     #[inline(always)]
     pub(crate) fn space(&self, x: [f64; 3]) -> [f64; 3] {
-        std::array::from_fn(|k| x[0] * self.tangents[0][k] + x[1] * self.tangents[1][k] + x[2] * self.normal[k])
+        let [u, v] = self.tangents;
+        [
+            x[0] * u[0] + x[1] * v[0] + x[2] * self.normal[0],
+            x[0] * u[1] + x[1] * v[1] + x[2] * self.normal[1],
+            x[0] * u[2] + x[1] * v[2] + x[2] * self.normal[2],
+        ]
     }
 
     /// Gradients of the three barycentric coordinates in the plane.

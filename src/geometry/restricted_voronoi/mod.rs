@@ -14,21 +14,29 @@
 //! diagram on every triangle.
 
 mod clip;
+mod exact;
 mod frame;
+mod subdivide;
 
 pub(crate) use clip::{Candidate, Corner};
 pub(crate) use frame::Frame;
 
 use crate::geometry::hilbert;
-use crate::geometry::point_tree::PointTree;
+use crate::geometry::point_tree::{PointTree, within_reach};
+use crate::linalg::lanes::Vector;
+use crate::linalg::processor::{Kernel, Processor};
 use crate::mesh::{dot, subtract};
-use clip::Clipper;
+use clip::{Clipper, Heights, Polygons};
+use exact::ExactClipper;
 use rayon::prelude::*;
 use std::fmt;
 use std::sync::Mutex;
+use subdivide::Subdivision;
 
 /// Triangles, or vertices, treated together by one thread.
 const CHUNK: usize = 512;
+/// Triangles with more candidates are subdivided first.
+const MANY: usize = 48;
 
 /// Why there is no diagram.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -98,11 +106,19 @@ pub(crate) struct Cut<'a> {
     pub(crate) polygon: &'a [Corner],
 }
 
+/// Memory for one triangle at a time.
 #[derive(Debug, Default)]
 struct Scratch {
     found: Vec<u32>,
+    candidates: Vec<Candidate>,
+    heights: Heights,
+    some_heights: Heights,
+    rivals: Vec<u32>,
+    polygons: Polygons,
     clipper: Clipper,
-    polygon: Vec<Corner>,
+    exact: ExactClipper,
+    duals: Vec<[f64; 3]>,
+    subdivision: Subdivision,
 }
 
 /// The connectivity of a surface, and memory for diagrams restricted to it. Made once, used for any number of positions of
@@ -184,37 +200,37 @@ impl RestrictedVoronoi {
         }
         let mut scratch = Scratch::default();
         let (mut polygon, mut labels) = (Vec::new(), Vec::new());
-        for triangle in 0..self.cells.len() as u32 {
-            self.cut(
-                triangle,
-                points,
-                sites,
-                compatibility,
-                &mut scratch,
-                &mut |cut: &Cut<'_>| {
-                    polygon.clear();
-                    labels.clear();
-                    let mut doubled = 0.0;
-                    for (k, corner) in cut.polygon.iter().enumerate() {
-                        let next = cut.polygon[(k + 1) % cut.polygon.len()];
-                        doubled += corner.u * next.v - corner.v * next.u;
-                        let x = cut.frame.space([corner.u, corner.v, 0.0]);
-                        polygon.push(std::array::from_fn(|axis| cut.frame.origin[axis] + x[axis]));
-                        labels.push(match corner.mark {
-                            mark if mark < 0 => Label::Edge((-1 - mark) as u8),
-                            other => Label::Site(cut.candidates[other as usize].site),
-                        });
-                    }
-                    visit(&Piece {
-                        triangle,
-                        site: cut.candidates[cut.owner].site,
-                        polygon: &polygon,
-                        labels: &labels,
-                        area: 0.5 * doubled,
+        let triangles: Vec<u32> = (0..self.cells.len() as u32).collect();
+        Processor::detect().run(Sweep {
+            diagram: self,
+            triangles: &triangles,
+            points,
+            sites,
+            compatibility,
+            scratch: &mut scratch,
+            visit: |cut: &Cut<'_>| {
+                polygon.clear();
+                labels.clear();
+                let mut doubled = 0.0;
+                for (k, corner) in cut.polygon.iter().enumerate() {
+                    let next = cut.polygon[(k + 1) % cut.polygon.len()];
+                    doubled += corner.u * next.v - corner.v * next.u;
+                    let x = cut.frame.space([corner.u, corner.v, 0.0]);
+                    polygon.push(std::array::from_fn(|axis| cut.frame.origin[axis] + x[axis]));
+                    labels.push(match corner.mark {
+                        mark if mark < 0 => Label::Edge((-1 - mark) as u8),
+                        other => Label::Site(cut.candidates[other as usize].site),
                     });
-                },
-            );
-        }
+                }
+                visit(&Piece {
+                    triangle: cut.triangle,
+                    site: cut.candidates[cut.owner].site,
+                    polygon: &polygon,
+                    labels: &labels,
+                    area: 0.5 * doubled,
+                });
+            },
+        });
     }
 
     /// Calls `visit` for every piece, in parallel: chunk `k` of the triangles with `states[k]`.
@@ -230,20 +246,18 @@ impl RestrictedVoronoi {
             return false;
         }
         let this = &*self;
-        this.order.par_chunks(CHUNK).zip(states).for_each(|(chunk, state)| {
+        let processor = Processor::detect();
+        this.order.par_chunks(CHUNK).zip(states).for_each(|(triangles, state)| {
             let mut scratch = this.take();
-            for &triangle in chunk {
-                this.cut(
-                    triangle,
-                    points,
-                    sites,
-                    compatibility,
-                    &mut scratch,
-                    &mut |cut: &Cut<'_>| {
-                        visit(state, cut);
-                    },
-                );
-            }
+            processor.run(Sweep {
+                diagram: this,
+                triangles,
+                points,
+                sites,
+                compatibility,
+                scratch: &mut scratch,
+                visit: |cut: &Cut<'_>| visit(state, cut),
+            });
             this.give(scratch);
         });
         true
@@ -266,19 +280,20 @@ impl RestrictedVoronoi {
     /// Finds the site nearest to every vertex. False when there are no sites or not all coordinates are finite.
     fn find_nearest(&mut self, points: &[[f64; 3]], sites: &PointTree) -> bool {
         assert_eq!(points.len(), self.vertices, "as many points as at the preparation");
-        if sites.points().is_empty() || !sites.is_finite() || !points.iter().flatten().all(|x| x.is_finite()) {
+        if sites.points().is_empty() || !sites.is_finite() || !within_reach(points) {
             return false;
         }
+        let processor = Processor::detect();
         self.vertex_order
             .par_chunks(CHUNK)
             .zip(self.ordered.par_chunks_mut(CHUNK))
-            .for_each(|(chunk, found)| {
-                let mut hint = None;
-                for (&vertex, found) in chunk.iter().zip(found) {
-                    // There are sites, so there is a nearest one.
-                    *found = sites.nearest(points[vertex as usize], hint).map_or(0, |(site, _)| site);
-                    hint = Some(*found);
-                }
+            .for_each(|(vertices, found)| {
+                processor.run(FindNearest {
+                    vertices,
+                    points,
+                    sites,
+                    found,
+                });
             });
         for (&vertex, &found) in self.vertex_order.iter().zip(&self.ordered) {
             self.nearest[vertex as usize] = found;
@@ -287,7 +302,8 @@ impl RestrictedVoronoi {
     }
 
     /// Cuts one triangle.
-    fn cut(
+    #[inline(always)]
+    fn cut<V: Vector>(
         &self,
         triangle: u32,
         points: &[[f64; 3]],
@@ -297,9 +313,22 @@ impl RestrictedVoronoi {
         visit: &mut impl FnMut(&Cut<'_>),
     ) {
         let cell = self.cells[triangle as usize];
-        let corners = cell.map(|vertex| points[vertex as usize]);
+        let [a, b, c] = cell.map(|vertex| vertex as usize);
+        let corners = [points[a], points[b], points[c]];
         let Some(frame) = Frame::new(corners) else { return };
-        let near = cell.map(|vertex| self.nearest[vertex as usize]);
+        let near = [self.nearest[a], self.nearest[b], self.nearest[c]];
+        let Scratch {
+            found,
+            candidates,
+            heights,
+            some_heights,
+            rivals,
+            polygons,
+            clipper,
+            exact,
+            duals,
+            subdivision,
+        } = scratch;
         let positions = sites.points();
         let offset = |site: u32| {
             compatibility.map_or(0.0, |compatibility| {
@@ -307,66 +336,220 @@ impl RestrictedVoronoi {
                 compatibility.weight * (1.0 - dot(normal, frame.normal)).max(0.0)
             })
         };
-        let square = |k: usize, site: u32| {
-            let difference = subtract(corners[k], positions[site as usize]);
-            dot(difference, difference) + offset(site)
-        };
-        // The reference: of the sites nearest to the vertices the one with the smallest sum over the vertices.
-        let sum = |site: u32| square(0, site) + square(1, site) + square(2, site);
-        let mut reference = near[0];
-        for &site in &near[1..] {
-            if site != reference && (sum(site), site) < (sum(reference), reference) {
-                reference = site;
+        // A little more than the squared distances, for their rounding.
+        let mut bounds = [[0.0; 3]; 3];
+        for k in 0..3 {
+            if k > 0 && near[k] == near[k - 1] {
+                bounds[k] = bounds[k - 1];
+                continue;
+            }
+            let offset = offset(near[k]);
+            for corner in 0..3 {
+                let difference = subtract(corners[corner], positions[near[k] as usize]);
+                bounds[k][corner] = (dot(difference, difference) + offset) * (1.0 + 1e-12);
             }
         }
-        scratch.found.clear();
+        // The reference: of the sites nearest to the vertices the one with the smallest sum over the vertices.
+        let sum = |k: usize| bounds[k][0] + bounds[k][1] + bounds[k][2];
+        let mut best = 0;
+        for k in 1..3 {
+            if near[k] != near[best] && (sum(k), near[k]) < (sum(best), near[best]) {
+                best = k;
+            }
+        }
+        let reference = near[best];
+        found.clear();
         if compatibility.is_some() || near != [reference; 3] {
-            // A little more than needed, for the rounding of the squares.
-            let squares = std::array::from_fn(|k| square(k, reference) * (1.0 + 1e-12));
-            sites.within_any(&corners, squares, &mut scratch.found);
+            // No site owns a part that is not closer to some vertex than each of these.
+            let mut distinct = [bounds[best]; 3];
+            let mut count = 1;
+            for k in 0..3 {
+                if near[k] != reference && !(k == 2 && near[1] == near[2]) {
+                    distinct[count.min(2)] = bounds[k];
+                    count += 1;
+                }
+            }
+            sites.contenders::<V>(&corners, &distinct[..count.min(3)], found);
+            if compatibility.is_some() {
+                if !found.contains(&reference) {
+                    found.push(reference);
+                }
+                // Sites in one place may differ by their normals.
+                for place in 0..found.len() {
+                    let mut site = found[place];
+                    while let Some(twin) = sites.twin(site) {
+                        found.push(twin);
+                        site = twin;
+                    }
+                }
+            }
         }
         let origin = positions[reference as usize];
         let reference_offset = offset(reference);
-        let clipper = &mut scratch.clipper;
-        clipper.candidates.clear();
-        let candidate = |site: u32| {
+        let mut scale = 0.0f64;
+        candidates.clear();
+        let to_origin = subtract(origin, frame.origin);
+        let mut add = |site: u32| {
             let y = positions[site as usize];
             let difference = subtract(y, origin);
-            let [du, dv, _] = frame.local(difference);
-            let middle =
-                std::array::from_fn(|axis| (y[axis] - frame.origin[axis]) + (origin[axis] - frame.origin[axis]));
+            let from_origin = subtract(y, frame.origin);
+            let middle = [
+                from_origin[0] + to_origin[0],
+                from_origin[1] + to_origin[1],
+                from_origin[2] + to_origin[2],
+            ];
             let offset = offset(site);
-            Candidate {
+            scale = scale.max(size(difference) * (size(middle) + 2.0 * frame.diameter) + offset + reference_offset);
+            candidates.push(Candidate {
                 site,
                 height: [
-                    -2.0 * du,
-                    -2.0 * dv,
+                    -2.0 * dot(difference, frame.tangents[0]),
+                    -2.0 * dot(difference, frame.tangents[1]),
                     dot(difference, middle) + (offset - reference_offset),
                 ],
-                local: frame.local(subtract(y, frame.origin)),
+                local: frame.local(from_origin),
                 offset,
-            }
+            });
         };
-        clipper.candidates.push(candidate(reference));
-        for &site in &scratch.found {
+        add(reference);
+        for &site in found.iter() {
             if site != reference {
-                clipper.candidates.push(candidate(site));
+                add(site);
             }
         }
-        for owner in 0..clipper.candidates.len() {
-            let polygon = clipper.cell(&frame, owner);
-            if polygon.len() < 3 {
-                continue;
+        polygons.clear();
+        if candidates.len() == 1 {
+            polygons.push(0, &Clipper::triangle(&frame));
+        } else {
+            heights.clear();
+            for candidate in candidates.iter() {
+                heights.push(candidate.height);
             }
-            scratch.polygon.clear();
-            scratch.polygon.extend_from_slice(polygon);
+            // Differences of height functions below this are rounding.
+            let tolerance = 32.0 * f64::EPSILON * scale;
+            let few = candidates.len() <= MANY;
+            if few {
+                let start = Clipper::corners::<V>(&frame, heights);
+                for owner in 0..candidates.len() {
+                    let polygon = clipper.cell::<V>(&start, heights, owner, tolerance);
+                    if polygon.len() >= 3 {
+                        polygons.push(owner, polygon);
+                    }
+                }
+            } else {
+                subdivision.divide(&frame, heights, tolerance);
+                for owner in 0..candidates.len() {
+                    subdivision.rivals(owner, rivals);
+                    if rivals.is_empty() {
+                        continue;
+                    }
+                    some_heights.clear();
+                    for &rival in rivals.iter() {
+                        some_heights.push(candidates[rival as usize].height);
+                    }
+                    let start = Clipper::corners::<V>(&frame, some_heights);
+                    let polygon = clipper.cell::<V>(&start, some_heights, 0, tolerance);
+                    if polygon.len() >= 3 {
+                        polygons.push_renamed(owner, polygon, rivals);
+                    }
+                }
+            }
+            // Polygons that overlap or leave gaps betray themselves by their areas.
+            let allowed = 1e-10 * frame.area + 1e-14 * frame.diameter * frame.diameter;
+            if !((polygons.area - frame.area).abs() <= allowed) {
+                polygons.clear();
+                // Of equal functions the first one owns: the one with the smallest index.
+                candidates.sort_unstable_by_key(|candidate| candidate.site);
+                duals.clear();
+                duals.extend(candidates.iter().map(|candidate| exact::dual(&frame, candidate.height)));
+                if few {
+                    rivals.clear();
+                    rivals.extend(0..candidates.len() as u32);
+                } else {
+                    heights.clear();
+                    for candidate in candidates.iter() {
+                        heights.push(candidate.height);
+                    }
+                    subdivision.divide(&frame, heights, tolerance);
+                }
+                for owner in 0..candidates.len() {
+                    if !few {
+                        subdivision.rivals(owner, rivals);
+                        if rivals.is_empty() {
+                            continue;
+                        }
+                    }
+                    let polygon = exact.cell(&frame, duals, owner, rivals);
+                    if polygon.len() >= 3 {
+                        polygons.push(owner, polygon);
+                    }
+                }
+            }
+        }
+        for &(owner, start, end) in &polygons.parts {
             visit(&Cut {
                 triangle,
                 frame: &frame,
-                candidates: &clipper.candidates,
-                owner,
-                polygon: &scratch.polygon,
+                candidates,
+                owner: owner as usize,
+                polygon: &polygons.corners[start as usize..end as usize],
             });
+        }
+    }
+}
+
+/// Sum of magnitudes.
+#[inline(always)]
+fn size(x: [f64; 3]) -> f64 {
+    x[0].abs() + x[1].abs() + x[2].abs()
+}
+
+/// Cuts a chunk of triangles in vector registers.
+struct Sweep<'a, Visit> {
+    diagram: &'a RestrictedVoronoi,
+    triangles: &'a [u32],
+    points: &'a [[f64; 3]],
+    sites: &'a PointTree,
+    compatibility: Option<Compatibility<'a>>,
+    scratch: &'a mut Scratch,
+    visit: Visit,
+}
+
+impl<Visit: FnMut(&Cut<'_>)> Kernel for Sweep<'_, Visit> {
+    #[inline(always)]
+    fn run<V: Vector>(mut self) {
+        for &triangle in self.triangles {
+            self.diagram.cut::<V>(
+                triangle,
+                self.points,
+                self.sites,
+                self.compatibility,
+                self.scratch,
+                &mut self.visit,
+            );
+        }
+    }
+}
+
+/// Finds the sites nearest to a chunk of vertices.
+struct FindNearest<'a> {
+    vertices: &'a [u32],
+    points: &'a [[f64; 3]],
+    sites: &'a PointTree,
+    found: &'a mut [u32],
+}
+
+impl Kernel for FindNearest<'_> {
+    #[inline(always)]
+    fn run<V: Vector>(self) {
+        let mut hint = None;
+        for (&vertex, found) in self.vertices.iter().zip(self.found) {
+            // There are sites, so there is a nearest one.
+            *found = self
+                .sites
+                .nearest_in::<V>(self.points[vertex as usize], hint)
+                .map_or(0, |(site, _)| site);
+            hint = Some(*found);
         }
     }
 }

@@ -15,6 +15,7 @@
 mod cholesky;
 mod dense;
 mod elimination;
+mod geometric_dissection;
 mod graph;
 mod minimum_degree;
 mod nested_dissection;
@@ -23,6 +24,7 @@ mod separator;
 
 pub use cholesky::{BlockCholesky, NotPositive};
 pub use elimination::Elimination;
+pub use geometric_dissection::geometric_dissection;
 pub use graph::Graph;
 pub use nested_dissection::nested_dissection;
 pub use pattern::{BlockPattern, FIXED, PatternError};

@@ -8,7 +8,7 @@ use super::minimum_degree::minimum_degree;
 use super::separator::{SEPARATOR, Weighted, separate};
 
 /// Subgraphs of at most this many vertices are ordered by minimum degree.
-const LEAF: usize = 120;
+pub(super) const LEAF: usize = 120;
 /// A subgraph without separator and with more vertices than this is all but complete: any order serves.
 const DENSE: usize = 4096;
 /// Halves of at least this many vertices are ordered side by side.
@@ -93,7 +93,7 @@ fn extract(part: &Weighted, names: &[u32], side: &[u8], kind: u8) -> (Weighted, 
 }
 
 /// Orders a small subgraph with its neighbours in the whole graph, all of which are eliminated later.
-fn leaf(whole: &Graph, names: &[u32], order: &mut [u32]) {
+pub(super) fn leaf(whole: &Graph, names: &[u32], order: &mut [u32]) {
     if names.len() > DENSE {
         return order.copy_from_slice(names);
     }

@@ -151,7 +151,7 @@ pub const FORMATS: &[Entry] = &[
         extensions: &["msh2"],
         cells: &CellKind::ALL,
         doc: "as Gmsh 4.1, but written as 2.2",
-        sniff: gmsh::sniff,
+        sniff: gmsh::sniff2,
         read: gmsh::read,
         write: gmsh::write_version_2,
     },

@@ -1,12 +1,13 @@
 //! Wavefront OBJ, read through the crate tobj.
 //!
 //! Vertices keep the order of the file, also those that no face uses; negative indices count back from the last vertex.
-//! Polygons with more than four corners become fans, with a notice. Texture coordinates, normals, colours, groups and
-//! materials are left out silently, as they do not shape the mesh; lines, points and free forms with a notice.
+//! Polygons with more than four corners become fans, with a notice. Normals become the point field `normals`, where faces
+//! name them: the sum over a vertex's corners, zero where there are none. Texture coordinates, colours, groups and materials
+//! are left out silently, as they do not shape the mesh; lines, points and free forms with a notice.
 
 use super::cells::Sorter;
 use super::text::{Text, parse_real, shown};
-use super::{CellKind, Content, Fault, Written, left_out};
+use super::{CellKind, Content, Fault, Field, Written, left_out};
 use std::collections::BTreeMap;
 use std::io::{BufRead, Read, Write as _};
 
@@ -211,7 +212,8 @@ pub(super) fn read(bytes: &[u8]) -> Result<Content, Fault> {
             rest = after;
         }
     }
-    let mut content = sorter.finish(points, Vec::new(), Vec::new())?;
+    let point_data = read_normals(bytes, vertices)?;
+    let mut content = sorter.finish(points, point_data, Vec::new())?;
     for (keyword, count) in lines.left_out {
         content.notices.push(format!("lines of {keyword:?} left out: {count}"));
     }
@@ -226,6 +228,84 @@ fn count_vertices(bytes: &[u8]) -> usize {
         count += usize::from(matches!(line, [b'v', after, ..] if after.is_ascii_whitespace()) || line == b"v");
     }
     count
+}
+
+/// The name of the point field that holds normals.
+const NORMALS: &str = "normals";
+
+/// The normals that corners of faces name, summed over the corners of every vertex; nothing when no corner names one.
+fn read_normals(bytes: &[u8], vertices: usize) -> Result<Vec<Field>, Fault> {
+    let mut text = Text::new(bytes, None);
+    let mut normals: Vec<[f64; 3]> = Vec::new();
+    let mut corners: Vec<(usize, i64, usize)> = Vec::new();
+    let mut seen: i64 = 0;
+    loop {
+        let at = text.at();
+        let Some(line) = text.line() else { break };
+        let line = line.split(|&byte| byte == b'#').next().unwrap_or_default();
+        let mut words = line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
+        match words.next() {
+            Some(b"v") => seen += 1,
+            Some(b"vn") => {
+                let mut normal = [0.0; 3];
+                for component in &mut normal {
+                    let value = words.next().and_then(parse_real).filter(|value| value.is_finite());
+                    *component = value.ok_or_else(|| Fault::text(at, "a normal needs three finite numbers"))?;
+                }
+                normals.push(normal);
+            }
+            Some(b"f") => {
+                for word in words {
+                    let mut parts = word.split(|&byte| byte == b'/');
+                    let (vertex, normal) = (parts.next().unwrap_or_default(), parts.nth(1).unwrap_or_default());
+                    let Some(vertex) = super::text::parse_integer(vertex) else {
+                        continue;
+                    };
+                    let vertex = if vertex < 0 {
+                        seen.saturating_add(vertex)
+                    } else {
+                        vertex.saturating_sub(1)
+                    };
+                    if normal.is_empty() || vertex < 0 || vertex >= vertices as i64 {
+                        continue;
+                    }
+                    let index = super::text::parse_integer(normal)
+                        .ok_or_else(|| Fault::text(at, format!("{} is no number of a normal", shown(normal))))?;
+                    let index = if index < 0 {
+                        (normals.len() as i64).saturating_add(index)
+                    } else {
+                        index.saturating_sub(1)
+                    };
+                    corners.push((vertex as usize, index, at));
+                }
+            }
+            _ => {}
+        }
+    }
+    if corners.is_empty() {
+        return Ok(Vec::new());
+    }
+    let mut values = vec![0.0; 3 * vertices];
+    for (vertex, index, at) in corners {
+        let Some(normal) = usize::try_from(index).ok().and_then(|index| normals.get(index)) else {
+            return Err(Fault::text(
+                at,
+                format!(
+                    "the face names normal {}; there are {}, counted from 1",
+                    index.saturating_add(1),
+                    normals.len()
+                ),
+            ));
+        };
+        for axis in 0..3 {
+            values[3 * vertex + axis] += normal[axis];
+        }
+    }
+    Ok(vec![Field {
+        name: NORMALS.to_string(),
+        components: 3,
+        values,
+    }])
 }
 
 /// Names the first face with a corner that is none of the vertices.
@@ -265,25 +345,36 @@ fn out_of_bounds(bytes: &[u8], vertices: usize) -> Fault {
     }
 }
 
-/// Writes vertices and faces.
+/// Writes vertices and faces, and normals from the point field `normals`.
 pub(super) fn write(content: &Content) -> Result<Written, String> {
+    let is_normals = |field: &Field| field.name == NORMALS && field.components == 3;
+    let normals = content.point_data.iter().find(|field| is_normals(field));
     let mut out = Vec::with_capacity(64 * content.points.len() + 24 * content.cells().count());
     // Writing to memory cannot fail.
     for [x, y, z] in &content.points {
         let _ = writeln!(out, "v {x:?} {y:?} {z:?}");
+    }
+    if let Some(field) = normals {
+        for [x, y, z] in field.values.as_chunks::<3>().0 {
+            let _ = writeln!(out, "vn {x:?} {y:?} {z:?}");
+        }
     }
     let cells = content.cells();
     for kind in CellKind::SURFACE {
         for corners in cells.corners_of(kind).chunks_exact(kind.corners()) {
             out.push(b'f');
             for corner in corners {
-                let _ = write!(out, " {}", u64::from(*corner) + 1);
+                let number = u64::from(*corner) + 1;
+                let _ = match normals {
+                    None => write!(out, " {number}"),
+                    Some(_) => write!(out, " {number}//{number}"),
+                };
             }
             out.push(b'\n');
         }
     }
     Ok(Written {
         bytes: out,
-        notices: left_out("OBJ", content, |_, _| false),
+        notices: left_out("OBJ", content, |field, of_points| of_points && is_normals(field)),
     })
 }

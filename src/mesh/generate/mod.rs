@@ -10,7 +10,10 @@ pub mod bar;
 pub mod bumpy;
 pub mod cube;
 pub mod ellipsoid;
+pub mod shape;
 pub mod star;
+pub mod surface;
+pub mod template;
 pub mod twisted_grid;
 
 use super::connectivity;

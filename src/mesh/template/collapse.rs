@@ -61,7 +61,10 @@ pub fn collapse(mesh: &MixedMesh, axis: usize, region: [[f64; 3]; 2]) -> Result<
             (Shape::Prism, 2) if gone.iter().all(|[a, b]| a + 3 == *b) => {
                 let kept = 3 - gone[0][0] - gone[1][0];
                 let (p, q) = ((kept + 1) % 3, (kept + 2) % 3);
-                result.push(Shape::Tetrahedron, &[merged[kept], merged[p], merged[q], merged[kept + 3]]);
+                result.push(
+                    Shape::Tetrahedron,
+                    &[merged[kept], merged[p], merged[q], merged[kept + 3]],
+                );
             }
             _ => return Err(impossible(index, shape)),
         }
@@ -97,16 +100,24 @@ fn prism(corners: &[u32], first: [usize; 2], second: [usize; 2]) -> Option<[u32;
         return None;
     }
     // Faces run counter-clockwise seen from outside; a prism's bottom the other way round.
-    let mut below: Vec<usize> = bottom.iter().rev().copied().filter(|&corner| corner != first[1]).collect();
+    let mut below: Vec<usize> = bottom
+        .iter()
+        .rev()
+        .copied()
+        .filter(|&corner| corner != first[1])
+        .collect();
     if below.len() != 3 {
         return None;
     }
     let above = |corner: usize| {
-        shape.edges().iter().find_map(|&[a, b]| match (a == corner, b == corner) {
-            (true, _) if !bottom.contains(&b) => Some(b),
-            (_, true) if !bottom.contains(&a) => Some(a),
-            _ => None,
-        })
+        shape
+            .edges()
+            .iter()
+            .find_map(|&[a, b]| match (a == corner, b == corner) {
+                (true, _) if !bottom.contains(&b) => Some(b),
+                (_, true) if !bottom.contains(&a) => Some(a),
+                _ => None,
+            })
     };
     let top: Option<Vec<usize>> = below.iter().map(|&corner| above(corner)).collect();
     below.extend(top?);

@@ -66,7 +66,8 @@ fn stack(mesh: &mut MixedMesh, faces: &[Vec<u32>], distance: f64, layers: usize)
             let normal = normals[&vertex];
             let size = length(normal).max(f64::MIN_POSITIVE);
             above.insert(vertex, mesh.points.len() as u32);
-            mesh.points.push(add_scaled(mesh.points[below as usize], normal, step / size));
+            mesh.points
+                .push(add_scaled(mesh.points[below as usize], normal, step / size));
         }
         for corners in faces {
             let lower = corners.iter().map(|corner| level[corner]);
@@ -76,7 +77,11 @@ fn stack(mesh: &mut MixedMesh, faces: &[Vec<u32>], distance: f64, layers: usize)
             } else {
                 upper.chain(lower).collect()
             };
-            let shape = if corners.len() == 4 { Shape::Hexahedron } else { Shape::Prism };
+            let shape = if corners.len() == 4 {
+                Shape::Hexahedron
+            } else {
+                Shape::Prism
+            };
             mesh.push(shape, &cell);
         }
         level = above;

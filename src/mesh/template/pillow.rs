@@ -46,7 +46,11 @@ pub fn pillow(mesh: &MixedMesh, thickness: f64) -> Result<MixedMesh, String> {
         let inner = face.corners();
         let mut corners = inner.to_vec();
         corners.extend(inner.iter().map(|&corner| outer[corner as usize]));
-        let shape = if inner.len() == 4 { Shape::Hexahedron } else { Shape::Prism };
+        let shape = if inner.len() == 4 {
+            Shape::Hexahedron
+        } else {
+            Shape::Prism
+        };
         result.push(shape, &corners);
     }
     Ok(result)

@@ -18,9 +18,7 @@ pub fn voxels(surface: &TriangleMesh, along: usize) -> Result<MixedMesh, String>
     let size = longest / along as f64;
     // One empty layer around, so that additions have room.
     let counts: [usize; 3] = std::array::from_fn(|axis| ((high[axis] - low[axis]) / size - 1e-9).ceil() as usize + 2);
-    let start: [f64; 3] = std::array::from_fn(|axis| {
-        0.5 * (low[axis] + high[axis]) - 0.5 * counts[axis] as f64 * size
-    });
+    let start: [f64; 3] = std::array::from_fn(|axis| 0.5 * (low[axis] + high[axis]) - 0.5 * counts[axis] as f64 * size);
     let place = |[i, j, k]: [usize; 3]| i + counts[0] * (j + counts[1] * k);
     let mut inside = vec![false; counts.iter().product()];
     for j in 0..counts[1] {

@@ -94,9 +94,8 @@ impl Method for VolumeFit {
         observer.phase("prepare");
         let mut notices = Vec::new();
         let part = |role: &str| inputs.model.parts.get(role);
-        let template_part = part("template").ok_or_else(|| {
-            invalid("the model has no `template`; give it a file or a generator".to_string())
-        })?;
+        let template_part = part("template")
+            .ok_or_else(|| invalid("the model has no `template`; give it a file or a generator".to_string()))?;
         let (volume, target) = match part("target") {
             Some(part) => {
                 let target = target::read(part)?;
@@ -123,7 +122,10 @@ const COUNTERS: &[(&str, &str)] = &[
 
 /// Names and meanings of the traces.
 const TRACES: &[(&str, &str)] = &[
-    ("iteration", "accepted steps before this row, counted through all stages"),
+    (
+        "iteration",
+        "accepted steps before this row, counted through all stages",
+    ),
     ("stage", "number of the stage, from 0"),
     ("energy", "surface energy plus lambda times volume energy"),
     ("energy_surface", "the surface energy"),
@@ -238,7 +240,9 @@ impl<'a> Fit<'a> {
         let [low, high] = bounding_box(points).ok_or_else(|| invalid("the target has no points".to_string()))?;
         let unit = mesh::diagonal(points);
         if !(unit > 0.0 && unit.is_finite()) {
-            return Err(invalid(format!("the target's box has the diagonal {unit}; it needs an extent")));
+            return Err(invalid(format!(
+                "the target's box has the diagonal {unit}; it needs an extent"
+            )));
         }
         let middle: [f64; 3] = std::array::from_fn(|axis| 0.5 * (low[axis] + high[axis]));
         let lists = [
@@ -266,9 +270,7 @@ impl<'a> Fit<'a> {
         let references = references_of_volume(volume.iter().map(|cell| cell.0), scale.volume);
         let unit_volume: f64 = volume
             .iter()
-            .map(|(shape, _)| {
-                crate::fem::batches::reference_volume(shape, &crate::fem::batches::unit_reference(shape))
-            })
+            .map(|(shape, _)| crate::fem::batches::reference_volume(shape, &crate::fem::batches::unit_reference(shape)))
             .sum();
         let first = settings.stages[0].order;
         let space = Space::new(&volume, &topology, settings.basis, &vec![first; volume.cells()]).map_err(invalid)?;
@@ -375,7 +377,9 @@ impl<'a> Fit<'a> {
             && !interrupted(stop)
         {
             for _ in 0..adaptive.steps {
-                let Some(orders) = adaptivity::raised(self, &adaptive)? else { break };
+                let Some(orders) = adaptivity::raised(self, &adaptive)? else {
+                    break;
+                };
                 self.raise(&orders)?;
                 let stage = Stage {
                     order: orders.iter().copied().max().unwrap_or(1),
@@ -463,7 +467,11 @@ impl<'a> Fit<'a> {
                 None
             };
             let left = stage.iterations - done;
-            let round = if settings.preconditioned { left.min(settings.refresh) } else { left };
+            let round = if settings.preconditioned {
+                left.min(settings.refresh)
+            } else {
+                left
+            };
             let mut objective = FitObjective {
                 volume: &volume,
                 boundary: &boundary,
@@ -556,10 +564,17 @@ impl<'a> Fit<'a> {
         set("scaled_jacobian_min", least(&quality.scaled_jacobian_min));
         set("inverted", flags.iter().filter(|flag| **flag).count() as f64);
         set("min_determinant", least(&quality.least_determinant));
-        set("max_determinant", -least(&quality.largest_determinant.iter().map(|det| -det).collect::<Vec<_>>()));
+        set(
+            "max_determinant",
+            -least(&quality.largest_determinant.iter().map(|det| -det).collect::<Vec<_>>()),
+        );
         set("determinant_spread", quality.spread);
         let judged = |wanted: outcome::Judged| {
-            certificates.verdicts.iter().filter(|verdict| **verdict == wanted).count() as f64
+            certificates
+                .verdicts
+                .iter()
+                .filter(|verdict| **verdict == wanted)
+                .count() as f64
         };
         set("certified", judged(outcome::Judged::Certified));
         set("undecided", judged(outcome::Judged::Undecided));
@@ -573,9 +588,13 @@ impl<'a> Fit<'a> {
         set("nodes", self.space.nodes as f64);
         let highest = self.space.orders.iter().copied().max().unwrap_or(1);
         let most = self.settings.adaptive.map_or(highest, |adaptive| adaptive.most);
-        let full = Space::new(&self.volume, &self.topology, self.settings.basis, &vec![most; cells]).map_err(invalid)?;
+        let full =
+            Space::new(&self.volume, &self.topology, self.settings.basis, &vec![most; cells]).map_err(invalid)?;
         set("node_share", 100.0 * self.space.nodes as f64 / full.nodes as f64);
-        set("order_mean", self.space.orders.iter().sum::<usize>() as f64 / cells as f64);
+        set(
+            "order_mean",
+            self.space.orders.iter().sum::<usize>() as f64 / cells as f64,
+        );
         set("order_max", highest as f64);
         set("elements", cells as f64);
         set("hexahedra", self.volume.hexahedra.len() as f64);
@@ -589,7 +608,11 @@ impl<'a> Fit<'a> {
             .chunks_exact(3)
             .enumerate()
             .flat_map(|(node, values)| {
-                let middle = if node < self.space.vertices { self.middle } else { [0.0; 3] };
+                let middle = if node < self.space.vertices {
+                    self.middle
+                } else {
+                    [0.0; 3]
+                };
                 [0, 1, 2].map(|axis| values[axis] * self.unit + middle[axis])
             })
             .collect();
@@ -598,7 +621,10 @@ impl<'a> Fit<'a> {
             ("scaled_jacobian_min", quality.scaled_jacobian_min.clone()),
             ("order", self.space.orders.iter().map(|&order| order as f64).collect()),
             ("determinant_min", quality.least_determinant.clone()),
-            ("inverted", flags.iter().map(|&flag| f64::from(u8::from(flag))).collect()),
+            (
+                "inverted",
+                flags.iter().map(|&flag| f64::from(u8::from(flag))).collect(),
+            ),
             ("element", (0..cells).map(|cell| cell as f64).collect()),
         ];
         let picture = outcome::picture(&self.space, &self.references, &given, &self.volume, &fields)?;
@@ -624,7 +650,10 @@ impl<'a> Fit<'a> {
 }
 
 fn interrupted(stop: StopReason) -> bool {
-    matches!(stop, StopReason::TimeLimit | StopReason::Cancelled | StopReason::NotFinite)
+    matches!(
+        stop,
+        StopReason::TimeLimit | StopReason::Cancelled | StopReason::NotFinite
+    )
 }
 
 fn mean(values: &[f64]) -> f64 {
@@ -638,7 +667,10 @@ fn least(values: &[f64]) -> f64 {
 /// Names what is wrong with a target surface; an inside-out one is turned, an open or damaged one only mentioned.
 fn check_target(target: &Target, notices: &mut Vec<String>) -> Result<(), Failure> {
     if target.surface.cells.is_empty() {
-        notices.push(format!("the target is a cloud of {} points without normals", target.sites.len()));
+        notices.push(format!(
+            "the target is a cloud of {} points without normals",
+            target.sites.len()
+        ));
         return Ok(());
     }
     if target.sites.is_empty() {

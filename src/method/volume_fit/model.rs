@@ -13,9 +13,18 @@ static OPERATION: &[Field] = &[
         name: "op",
         kind: Kind::Choice(&[
             ("carve", "remove the cells whose centroid lies in the box"),
-            ("extrude", "put layers of cells on the boundary faces whose centroid lies in the box"),
-            ("pillow", "put a layer of cells around the whole boundary, inside the old one"),
-            ("collapse", "collapse the edges along an axis whose middle lies in the box"),
+            (
+                "extrude",
+                "put layers of cells on the boundary faces whose centroid lies in the box",
+            ),
+            (
+                "pillow",
+                "put a layer of cells around the whole boundary, inside the old one",
+            ),
+            (
+                "collapse",
+                "collapse the edges along an axis whose middle lies in the box",
+            ),
         ]),
         default: Default::Required,
         doc: "What is done. Coordinates are the template's own: the first cube of a grid is the unit cube.",
@@ -71,7 +80,10 @@ static PLACE: Field = Field {
     name: "place",
     kind: Kind::Choice(&[
         ("box", "stretched axis by axis so that its box is the target's"),
-        ("scale", "scaled alike along all axes to the target's diagonal, and centred"),
+        (
+            "scale",
+            "scaled alike along all axes to the target's diagonal, and centred",
+        ),
         ("none", "left where it is"),
     ]),
     default: Default::Absent,
@@ -206,7 +218,10 @@ static KIND: LazyLock<ModelKind> = LazyLock::new(|| {
     }
     let resolution = || Field {
         name: "triangles",
-        kind: Kind::Integer { min: 100, max: 1_000_000 },
+        kind: Kind::Integer {
+            min: 100,
+            max: 1_000_000,
+        },
         default: Default::Integer(6000),
         doc: "Number of triangles wanted, roughly.",
     };
@@ -228,7 +243,11 @@ static KIND: LazyLock<ModelKind> = LazyLock::new(|| {
     let targets = vec![
         shape(
             "ellipsoid",
-            vec![size("a", 1.0, "Semi-axis along x."), size("b", 0.8, "Semi-axis along y."), size("c", 0.6, "Semi-axis along z.")],
+            vec![
+                size("a", 1.0, "Semi-axis along x."),
+                size("b", 0.8, "Semi-axis along y."),
+                size("c", 0.6, "Semi-axis along z."),
+            ],
             "An ellipsoid.",
         ),
         shape(
@@ -236,9 +255,21 @@ static KIND: LazyLock<ModelKind> = LazyLock::new(|| {
             vec![size("amplitude", 0.15, "Height of the bumps over the mean radius 1.")],
             "A sphere with smooth bumps.",
         ),
-        shape("block", vec![], "A cuboid with a step: flat faces, sharp edges, one of them concave."),
-        shape("joint", vec![], "A plate with a square hole and a boss on top: a mechanical part of genus 1."),
-        shape("double-torus", vec![], "A rounded plate with two holes: smooth, genus 2."),
+        shape(
+            "block",
+            vec![],
+            "A cuboid with a step: flat faces, sharp edges, one of them concave.",
+        ),
+        shape(
+            "joint",
+            vec![],
+            "A plate with a square hole and a boss on top: a mechanical part of genus 1.",
+        ),
+        shape(
+            "double-torus",
+            vec![],
+            "A rounded plate with two holes: smooth, genus 2.",
+        ),
         shape("bone", vec![], "A shaft with two thick ends, smooth."),
         shape("tooth", vec![], "A rounded block with four cusps on top, smooth."),
     ];

@@ -113,9 +113,8 @@ fn corner_frames(shape: Shape) -> Vec<Columns<f64>> {
             apply(&reference, edge)
         });
         // Frames that differ by signs alone give the same figure.
-        let same = |other: &Columns<f64>| {
-            (0..3).all(|i| (0..3).any(|j| (dot(frame[i], other[j]).abs() - 1.0).abs() < 1e-12))
-        };
+        let same =
+            |other: &Columns<f64>| (0..3).all(|i| (0..3).any(|j| (dot(frame[i], other[j]).abs() - 1.0).abs() < 1e-12));
         if !frames.iter().any(same) {
             frames.push(frame);
         }
@@ -144,15 +143,9 @@ pub fn quality(space: &Space, references: &[Columns<f64>], x: &[f64]) -> Result<
                     // The images' determinant over that of the frame is the map's own.
                     least = least.min(determinant / product.max(f64::MIN_POSITIVE));
                 }
-                let entry = sums.entry(cell).or_insert([
-                    0.0,
-                    0.0,
-                    f64::INFINITY,
-                    f64::INFINITY,
-                    f64::NEG_INFINITY,
-                    0.0,
-                    0.0,
-                ]);
+                let entry =
+                    sums.entry(cell)
+                        .or_insert([0.0, 0.0, f64::INFINITY, f64::INFINITY, f64::NEG_INFINITY, 0.0, 0.0]);
                 entry[0] += 1.0;
                 entry[1] += least;
                 entry[2] = entry[2].min(least);
@@ -281,7 +274,13 @@ fn crease_points(surface: &TriangleMesh) -> Vec<[f64; 3]> {
 }
 
 /// The volume as a VTU file of linear cells, every element cut evenly.
-pub fn picture(space: &Space, references: &[Columns<f64>], x: &[f64], volume: &MixedMesh, fields: &[(&str, Vec<f64>)]) -> Result<Vec<u8>, Failure> {
+pub fn picture(
+    space: &Space,
+    references: &[Columns<f64>],
+    x: &[f64],
+    volume: &MixedMesh,
+    fields: &[(&str, Vec<f64>)],
+) -> Result<Vec<u8>, Failure> {
     let cells = volume.cells();
     let highest = space.orders.iter().copied().max().unwrap_or(1);
     let mut cuts = if highest == 1 { 1 } else { (2 * highest).clamp(4, 8) };
@@ -344,8 +343,10 @@ pub fn picture(space: &Space, references: &[Columns<f64>], x: &[f64], volume: &M
             (*name, rows.map(|&cell| values[cell]).collect())
         })
         .collect();
-    let views: Vec<(&str, usize, &[f64])> =
-        spread.iter().map(|(name, values)| (*name, 1, values.as_slice())).collect();
+    let views: Vec<(&str, usize, &[f64])> = spread
+        .iter()
+        .map(|(name, values)| (*name, 1, values.as_slice()))
+        .collect();
     Ok(vtu::write(
         &points,
         Cells {
@@ -377,12 +378,11 @@ fn lattice(shape: Shape, m: usize) -> (Vec<Vec<u32>>, Vec<Vec<u32>>) {
         .iter()
         .map(|&[i, j, k]| {
             let line = |index: usize, end: f64| if end == 0.0 { m - index } else { index };
-            let simplex = |first: usize, corner: [f64; 3], axes: usize| {
-                match (0..axes).find(|&axis| corner[axis] == 1.0) {
+            let simplex =
+                |first: usize, corner: [f64; 3], axes: usize| match (0..axes).find(|&axis| corner[axis] == 1.0) {
                     None => m - first,
                     Some(axis) => [i, j, k][axis],
-                }
-            };
+                };
             canonical
                 .iter()
                 .map(|&corner| match shape {

@@ -293,7 +293,9 @@ pub fn diagonal(model: &Model<'_>) -> Vec<f64> {
     let mut diagonal = vec![0.0; space.nodes];
     let mut kinds: BTreeMap<Kind, Vec<f64>> = BTreeMap::new();
     for cell in &space.cells {
-        let own = kinds.entry(cell.kind).or_insert_with(|| stiffness_diagonal(space, cell.kind));
+        let own = kinds
+            .entry(cell.kind)
+            .or_insert_with(|| stiffness_diagonal(space, cell.kind));
         for (slot, value) in cell.slots.iter().zip(own.iter()) {
             if let Some((node, _)) = slot.node() {
                 diagonal[node] += bulk * value;
@@ -339,7 +341,14 @@ fn sample_blocks(model: &Model<'_>) -> Vec<[f64; 6]> {
                 let along = if i == j { tangential } else { 0.0 };
                 weight * ((1.0 - tangential) * n[i] * n[j] + along)
             };
-            [entry(0, 0), entry(0, 1), entry(0, 2), entry(1, 1), entry(1, 2), entry(2, 2)]
+            [
+                entry(0, 0),
+                entry(0, 1),
+                entry(0, 2),
+                entry(1, 1),
+                entry(1, 2),
+                entry(2, 2),
+            ]
         })
         .collect()
 }
@@ -365,7 +374,10 @@ fn node_places(mesh: &MixedMesh, space: &Space) -> Vec<[f64; 3]> {
             }
         }
     }
-    let mut places: Vec<[f64; 3]> = sums.iter().map(|(sum, count)| times(*sum, 1.0 / f64::max(*count, 1.0))).collect();
+    let mut places: Vec<[f64; 3]> = sums
+        .iter()
+        .map(|(sum, count)| times(*sum, 1.0 / f64::max(*count, 1.0)))
+        .collect();
     places[..mesh.points.len()].copy_from_slice(&mesh.points);
     places
 }

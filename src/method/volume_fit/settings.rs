@@ -10,7 +10,9 @@ use serde_json::Value;
 
 fn energy_names() -> Vec<(&'static str, String)> {
     let barriers = energy::energies().iter().filter(|energy| energy.is_barrier());
-    barriers.map(|energy| (energy.name(), energy.formula().to_string())).collect()
+    barriers
+        .map(|energy| (energy.name(), energy.formula().to_string()))
+        .collect()
 }
 
 fn basis_names() -> Vec<(&'static str, String)> {
@@ -19,7 +21,10 @@ fn basis_names() -> Vec<(&'static str, String)> {
 }
 
 fn rule_names() -> Vec<(&'static str, String)> {
-    RULES.iter().map(|&(name, _, meaning)| (name, meaning.to_string())).collect()
+    RULES
+        .iter()
+        .map(|&(name, _, meaning)| (name, meaning.to_string()))
+        .collect()
 }
 
 const ORDER: Kind = Kind::Integer {
@@ -172,8 +177,14 @@ pub static FIELDS: &[Field] = &[
         name: "distance",
         kind: Kind::Choice(&[
             ("symmetric", "both terms"),
-            ("to-target", "only from the template's surface to sites on the target (inverse fitting)"),
-            ("from-target", "only from the target's surface to samples of the template"),
+            (
+                "to-target",
+                "only from the template's surface to sites on the target (inverse fitting)",
+            ),
+            (
+                "from-target",
+                "only from the target's surface to samples of the template",
+            ),
             ("none", "the volume energy alone: the boundary is free"),
         ]),
         default: Default::Text("symmetric"),
@@ -182,7 +193,10 @@ pub static FIELDS: &[Field] = &[
     Field {
         name: "solver",
         kind: Kind::Choice(&[
-            ("preconditioned-l-bfgs", "L-BFGS from a factorized constant model of the Hessian"),
+            (
+                "preconditioned-l-bfgs",
+                "L-BFGS from a factorized constant model of the Hessian",
+            ),
             ("l-bfgs", "L-BFGS as in the paper"),
         ]),
         default: Default::Absent,
@@ -299,7 +313,12 @@ impl Settings {
     /// # Errors
     /// A value that the declaration does not allow, or a schedule that lowers the order.
     pub fn resolve(settings: &Value) -> Result<Settings, Failure> {
-        let declared = |name: &str| FIELDS.iter().find(|field| field.name == name).map(|field| &field.default);
+        let declared = |name: &str| {
+            FIELDS
+                .iter()
+                .find(|field| field.name == name)
+                .map(|field| &field.default)
+        };
         let text = |name: &str| -> String {
             let given = settings.get(name).and_then(Value::as_str);
             match (given, declared(name)) {
@@ -333,7 +352,9 @@ impl Settings {
                 return word;
             }
             let preset = PRESETS.iter().find(|preset| preset.0 == name);
-            preset.map_or(String::new(), |(_, best, printed)| (if paper { *printed } else { *best }).to_string())
+            preset.map_or(String::new(), |(_, best, printed)| {
+                (if paper { *printed } else { *best }).to_string()
+            })
         };
         let order = number("order") as usize;
         let limit = number("iteration_limit") as u64;
@@ -353,7 +374,17 @@ impl Settings {
                     });
                 }
             }
-            None => stages = default_schedule(order, &text("raise"), number("lambda_far"), number("lambda"), number("far_steps") as usize, limit, flag("adaptive")),
+            None => {
+                stages = default_schedule(
+                    order,
+                    &text("raise"),
+                    number("lambda_far"),
+                    number("lambda"),
+                    number("far_steps") as usize,
+                    limit,
+                    flag("adaptive"),
+                )
+            }
         }
         if stages.is_empty() {
             return Err(invalid("the schedule has no stage; give at least one".to_string()));
@@ -367,7 +398,10 @@ impl Settings {
             )));
         }
         if let Some(stage) = stages.iter().find(|stage| !(1..=HIGHEST_ORDER).contains(&stage.order)) {
-            return Err(invalid(format!("order {} is not between 1 and {HIGHEST_ORDER}", stage.order)));
+            return Err(invalid(format!(
+                "order {} is not between 1 and {HIGHEST_ORDER}",
+                stage.order
+            )));
         }
         let energy = energy::find(&text("energy")).filter(|energy| energy.is_barrier());
         let basis = basis::find(&chosen("basis"));
@@ -461,7 +495,11 @@ fn default_schedule(
         if here >= order || adaptive {
             return stages;
         }
-        here = if raise == "step" { here + 1 } else { (2 * here).min(order) };
+        here = if raise == "step" {
+            here + 1
+        } else {
+            (2 * here).min(order)
+        };
     }
 }
 

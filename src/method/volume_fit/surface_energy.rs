@@ -67,14 +67,12 @@ impl SurfaceEnergy {
             to_target = Some((term, PointTree::new(&target.sites), target.normals.clone()));
         }
         if terms.from_target && !target.surface.cells.is_empty() {
-            let term =
-                SquaredDistance::new(&target.surface.points, &target.surface.cells).map_err(|error| error.to_string())?;
+            let term = SquaredDistance::new(&target.surface.points, &target.surface.cells)
+                .map_err(|error| error.to_string())?;
             from_target = Some((term, target.surface.points.clone(), PointTree::default()));
         }
         if to_target.is_none() && from_target.is_none() && (terms.to_target || terms.from_target) {
-            return Err(
-                "a cloud of points has no surface to measure from; set distance = \"to-target\"".to_string(),
-            );
+            return Err("a cloud of points has no surface to measure from; set distance = \"to-target\"".to_string());
         }
         let length = scale.volume / scale.area;
         Ok(SurfaceEnergy {
@@ -101,7 +99,11 @@ impl SurfaceEnergy {
         if let Some((term, sites, normals)) = &mut self.to_target {
             let with_normals = s != 1.0 && self.has_normals;
             let options = Options {
-                anisotropy: if with_normals { Anisotropy::Sites(s, normals) } else { Anisotropy::None },
+                anisotropy: if with_normals {
+                    Anisotropy::Sites(s, normals)
+                } else {
+                    Anisotropy::None
+                },
                 ..Options::default()
             };
             let wanted = Wanted {
@@ -115,7 +117,11 @@ impl SurfaceEnergy {
         }
         if let Some((term, surface, tree)) = &mut self.from_target {
             let options = Options {
-                anisotropy: if s != 1.0 { Anisotropy::Facets(s) } else { Anisotropy::None },
+                anisotropy: if s != 1.0 {
+                    Anisotropy::Facets(s)
+                } else {
+                    Anisotropy::None
+                },
                 ..Options::default()
             };
             tree.set(samples);

@@ -181,7 +181,10 @@ struct Random(u64);
 
 impl Random {
     fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        self.0 = self
+            .0
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
         let mixed = (self.0 ^ (self.0 >> 33)).wrapping_mul(0xff51_afd7_ed55_8ccd);
         ((mixed ^ (mixed >> 33)) >> 11) as f64 / (1_u64 << 53) as f64
     }
@@ -218,7 +221,11 @@ fn damaged(surface: &TriangleMesh, parameters: &Value) -> TriangleMesh {
         }
     }
     if parameters.get("soup").and_then(Value::as_bool).unwrap_or(false) {
-        let points = result.cells.iter().flatten().map(|&corner| result.points[corner as usize]);
+        let points = result
+            .cells
+            .iter()
+            .flatten()
+            .map(|&corner| result.points[corner as usize]);
         result.points = points.collect();
         for (index, cell) in result.cells.iter_mut().enumerate() {
             *cell = std::array::from_fn(|corner| (3 * index + corner) as u32);
@@ -258,8 +265,7 @@ fn generate(name: &str, parameters: &Value, wanted: usize) -> TriangleMesh {
             surface
         }
         "block" => {
-            let mut surface =
-                quads_to_triangles(subdivided([3, 2, 2], |[i, _, k]| !(i > 0 && k == 1), wanted, false));
+            let mut surface = quads_to_triangles(subdivided([3, 2, 2], |[i, _, k]| !(i > 0 && k == 1), wanted, false));
             stretch(&mut surface, [1.0, 1.0, 0.7]);
             surface
         }
@@ -360,9 +366,19 @@ fn split(points: &[[f64; 3]], quads: &[[u32; 4]]) -> (Vec<[f64; 3]>, Vec<[u32; 4
                 points.len() as u32 - 1
             })
         };
-        let [ab, bc, cd, da, centre] =
-            [middle(&[a, b]), middle(&[b, c]), middle(&[c, d]), middle(&[d, a]), middle(&[a, b, c, d])];
-        result.extend([[a, ab, centre, da], [ab, b, bc, centre], [centre, bc, c, cd], [da, centre, cd, d]]);
+        let [ab, bc, cd, da, centre] = [
+            middle(&[a, b]),
+            middle(&[b, c]),
+            middle(&[c, d]),
+            middle(&[d, a]),
+            middle(&[a, b, c, d]),
+        ];
+        result.extend([
+            [a, ab, centre, da],
+            [ab, b, bc, centre],
+            [centre, bc, c, cd],
+            [da, centre, cd, d],
+        ]);
     }
     (points, result)
 }

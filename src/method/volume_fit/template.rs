@@ -26,20 +26,23 @@ const MOST_CELLS: usize = 4_000_000;
 pub fn read(part: &Part, target: Option<&Target>, notices: &mut Vec<String>) -> Result<MixedMesh, Failure> {
     let (mut mesh, parameters, generated) = match part {
         Part::Generated { generator, parameters } => {
-            let count = |name: &str, default: u64| {
-                parameters.get(name).and_then(Value::as_u64).unwrap_or(default) as usize
-            };
+            let count =
+                |name: &str, default: u64| parameters.get(name).and_then(Value::as_u64).unwrap_or(default) as usize;
             let mesh = match generator.as_str() {
                 "grid" => {
                     let counts = [count("x", 4), count("y", 4), count("z", 4)];
                     if counts.iter().product::<usize>() > MOST_CELLS {
-                        return Err(invalid(format!("a grid of {counts:?} has more than {MOST_CELLS} cells")));
+                        return Err(invalid(format!(
+                            "a grid of {counts:?} has more than {MOST_CELLS} cells"
+                        )));
                     }
                     grid::grid(counts)
                 }
                 "voxels" => {
                     let Some(target) = target.filter(|target| !target.surface.cells.is_empty()) else {
-                        return Err(invalid("voxels need a target surface; give one, or generate a grid".to_string()));
+                        return Err(invalid(
+                            "voxels need a target surface; give one, or generate a grid".to_string(),
+                        ));
                     };
                     voxels::voxels(&target.surface, count("along", 8)).map_err(invalid)?
                 }
@@ -82,7 +85,12 @@ pub fn read(part: &Part, target: Option<&Target>, notices: &mut Vec<String>) -> 
     mesh.topology().map_err(invalid)?;
     let place = parameters.get("place").and_then(Value::as_str);
     if let Some(target) = target {
-        lay(&mut mesh, target, place.unwrap_or(if generated { "box" } else { "none" })).map_err(invalid)?;
+        lay(
+            &mut mesh,
+            target,
+            place.unwrap_or(if generated { "box" } else { "none" }),
+        )
+        .map_err(invalid)?;
     }
     Ok(mesh)
 }

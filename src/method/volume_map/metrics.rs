@@ -28,7 +28,8 @@ const OWN: &[Metric] = &[
         "E",
         None,
         Better::Lower,
-        "Mean of the chosen energy density over the source with the chosen weighting, without barrier and constraints.",
+        "Mean of the chosen energy density with the chosen weighting, without barrier and constraints. Means weighted by the \
+         target's volume are divided by the sum of these weights.",
     ),
     metric(
         "energy_integral",

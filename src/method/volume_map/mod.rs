@@ -10,6 +10,7 @@
 //! outcome says which tetrahedra stay inverted.
 
 pub mod feasibility;
+pub mod fields;
 pub mod harmonic;
 pub mod l_bfgs;
 pub mod locally_injective;
@@ -52,7 +53,7 @@ impl Method for VolumeMap {
     }
 
     fn version(&self) -> u32 {
-        1
+        4
     }
 
     fn summary(&self) -> &'static str {
@@ -68,7 +69,7 @@ impl Method for VolumeMap {
     }
 
     fn settings(&self) -> &'static [Field] {
-        settings::FIELDS
+        fields::FIELDS
     }
 
     fn check(&self, settings: &Value) -> Vec<(String, String)> {
@@ -85,6 +86,14 @@ impl Method for VolumeMap {
 
     fn metrics(&self) -> &'static [Metric] {
         metrics::all()
+    }
+
+    fn incomparable(&self, metric: &str) -> &'static [&'static str] {
+        match metric {
+            "energy" => &["energy", "weighting", "rescale", "model"],
+            "energy_integral" => &["energy", "rescale", "model"],
+            _ => &[],
+        }
     }
 
     fn traces(&self) -> &'static [(&'static str, &'static str)] {
@@ -223,6 +232,10 @@ pub fn run(problem: &Problem, settings: &Settings, observer: &mut dyn Observer) 
         counters.set("approach_iterations", solution.counters.iterations);
         counters.add("factorizations", solution.counters.factorizations);
         counters.add("evaluations", solution.counters.evaluations);
+        if matches!(solution.stop, StopReason::TimeLimit | StopReason::Cancelled) {
+            let end = (solution.stop, "stopped from outside during the approach".to_string());
+            return finish(problem, settings, &positions, end, trace, counters, notices, observer);
+        }
         notices.push(format!(
             "the energy of the start is beyond all measure, so \"{}\" was minimized first, in {} iterations",
             Mips.name(),
@@ -268,6 +281,7 @@ pub fn run(problem: &Problem, settings: &Settings, observer: &mut dyn Observer) 
             positions = relaxed.positions;
             counters.set("iterations", relaxed.iterations);
             counters.set("relaxations", relaxed.relaxations);
+            counters.set("relaxation_iterations", relaxed.relaxation_iterations);
             counters.set("weights", relaxed.weights.len() as u64);
             counters.add("evaluations", relaxed.evaluations);
             (relaxed.stop, relaxed.reason)
@@ -352,6 +366,10 @@ pub const COUNTERS: &[(&str, &str)] = &[
         "Newton iterations on another energy, where the chosen one overflows on the start",
     ),
     ("relaxations", "relaxations of the relaxed-newton solver"),
+    (
+        "relaxation_iterations",
+        "accepted steps within these relaxations, counted apart from the iterations",
+    ),
     (
         "weights",
         "weights that the relaxed-newton solver minimized with, one after the other",

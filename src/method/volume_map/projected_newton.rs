@@ -3,7 +3,7 @@
 //! The negative eigenvalues of every tetrahedron's Hessian are known (Smith, de Goes, Kim 2019). By default as large a
 //! share of them is kept as leaves the whole positive definite: all of them near a minimum, where convergence is then
 //! quadratic, none where that fails. The first step tried is at most 0.9 of the largest that inverts no tetrahedron
-//! (Smith, Schaefer 2015), then halved until the energy has decreased enough.
+//! (Smith, Schaefer 2015), then halved until the energy has decreased enough, or doubled while that pays.
 //!
 //! Guaranteed: the energy never increases; no tetrahedron is inverted if none was and the energy or its barrier forbids
 //! it. Not guaranteed: a global minimum.
@@ -11,6 +11,7 @@
 use super::objective::MapObjective;
 use super::settings::Settings;
 use super::trace::{Recorder, Trace};
+use crate::optimize::line_search::Backtracking;
 use crate::optimize::newton::Newton;
 use crate::optimize::{Observer, Solution, Stopping};
 
@@ -30,7 +31,10 @@ pub fn minimize(
             iterations: settings.iteration_limit,
             ..Stopping::default()
         },
-        ..Newton::default()
+        line_search: Backtracking {
+            grow: true,
+            ..Backtracking::default()
+        },
     };
     let x = objective.unknowns(start);
     let mut recorder = Recorder {

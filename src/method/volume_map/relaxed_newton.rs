@@ -7,7 +7,7 @@
 //! time the method has converged off the target.
 //!
 //! Converged when the norm of the gradient, its slopes at the boundary divided by the weight where that exceeds 1, or the
-//! change of the energy is small. Guaranteed: no tetrahedron is inverted if none was and the energy or the barrier forbids it. Not guaranteed:
+//! change of the energy in a step of at least half the Newton direction is small. Guaranteed: no tetrahedron is inverted if none was and the energy or the barrier forbids it. Not guaranteed:
 //! that the boundary reaches its target; the residual is reported.
 
 use super::objective::{MapObjective, Pull};
@@ -15,7 +15,7 @@ use super::problem::Problem;
 use super::settings::{Continuation, RelaxedNewton, Settings};
 use super::trace::Trace;
 use crate::optimize::line_search::{Backtracking, Start};
-use crate::optimize::{Iterate, NewtonObjective, NoDirection, Objective, Observer, StopReason, norm};
+use crate::optimize::{Iterate, LONG_STEP, NewtonObjective, NoDirection, Objective, Observer, StopReason, norm};
 
 /// Where the method ended.
 #[derive(Clone, Debug, PartialEq)]
@@ -25,6 +25,8 @@ pub struct Relaxed {
     pub reason: String,
     pub iterations: u64,
     pub relaxations: u64,
+    /// Accepted steps within the relaxations.
+    pub relaxation_iterations: u64,
     pub evaluations: u64,
     /// Weights that were used up, one by one.
     pub weights: Vec<f64>,
@@ -53,6 +55,7 @@ struct Run<'a> {
     ahead: Vec<f64>,
     iterations: u64,
     relaxations: u64,
+    relaxation_iterations: u64,
     evaluations: u64,
 }
 
@@ -80,6 +83,7 @@ pub fn minimize(
         ahead: vec![0.0; size],
         iterations: 0,
         relaxations: 0,
+        relaxation_iterations: 0,
         evaluations: 0,
     };
     let mut weights = Vec::new();
@@ -115,6 +119,7 @@ pub fn minimize(
         reason,
         iterations: run.iterations,
         relaxations: run.relaxations,
+        relaxation_iterations: run.relaxation_iterations,
         evaluations: run.evaluations,
         weights,
     }
@@ -166,7 +171,8 @@ impl Run<'_> {
                     format!("balanced gradient norm {balanced:.3e} is below {tolerance:.3e} at weight {weight:.3e}"),
                 );
             }
-            if decrease < change {
+            // A step cut short lowers the energy by little wherever it is taken: it proves nothing.
+            if decrease < change && step >= LONG_STEP {
                 return (
                     StopReason::Converged,
                     format!("energy change {decrease:.3e} is below {change:.3e} at weight {weight:.3e}"),
@@ -183,10 +189,17 @@ impl Run<'_> {
             }
             let mut update = self.update(self.options.gradient_criterion);
             if matches!(update, Update::Refused) && self.options.relaxation {
+                let before = self.x.clone();
                 self.relax(problem, weight);
                 update = self.update(self.options.gradient_criterion);
-            }
-            if matches!(update, Update::Refused) && self.options.gradient_criterion {
+                if matches!(update, Update::Refused) && self.options.gradient_criterion {
+                    update = self.update(false);
+                }
+                if !matches!(update, Update::Accepted { .. }) {
+                    // A relaxation without a step after it has only raised the energy.
+                    self.x = before;
+                }
+            } else if matches!(update, Update::Refused) && self.options.gradient_criterion {
                 update = self.update(false);
             }
             match update {
@@ -230,7 +243,7 @@ impl Run<'_> {
         };
         let search = Backtracking {
             gradient_decrease: gradient_criterion,
-            trials: 20,
+            trials: 8,
             ..Backtracking::default()
         };
         let start = Start {
@@ -271,10 +284,16 @@ impl Run<'_> {
             targets: present,
         }));
         for _ in 0..self.options.relaxation_steps {
-            match self.update(false) {
-                // Less than this moves nothing that matters to the next step.
-                Update::Accepted { decrease, .. } if decrease > 1e-8 * problem.source_diagonal() => {}
-                _ => break,
+            if self.observer.stop().is_some() {
+                break;
+            }
+            let Update::Accepted { decrease, .. } = self.update(false) else {
+                break;
+            };
+            self.relaxation_iterations += 1;
+            // Less than this moves nothing that matters to the next step.
+            if decrease <= 1e-8 * problem.source_diagonal() {
+                break;
             }
         }
         self.objective.set_pull(Some(Pull {

@@ -126,7 +126,8 @@ pub fn order(solid: &Solid) -> Order {
 /// Connectivity and source positions (the only positions where there is no source).
 ///
 /// Layout: for each corner number `next - number`, where `next` is the count of points seen so far, as 16 or 32 bits in
-/// byte planes; then the positions.
+/// byte planes; then, where the solid has diagonals, a byte for each cell whose bits tell which pairs of its corners are
+/// no edges, (0,1), (0,2), (1,2), (0,3), (1,3), (2,3) from the lowest on; then the positions.
 pub fn topology(solid: &Solid, order: &Order) -> Packed {
     let mut number = vec![0u32; solid.points.len()];
     for (new, &old) in order.points.iter().enumerate() {
@@ -134,13 +135,18 @@ pub fn topology(solid: &Solid, order: &Order) -> Packed {
     }
     let mut next = 0u32;
     let mut codes = Vec::with_capacity(order.cells.len() * 4);
+    let mut hidden = Vec::new();
     for &cell in &order.cells {
-        let mut new: Vec<u32> = corners(solid, cell)
-            .iter()
-            .map(|&corner| number[corner as usize])
-            .collect();
-        new.sort_unstable();
-        for corner in new {
+        let mut sorted = corners(solid, cell).to_vec();
+        sorted.sort_unstable_by_key(|&corner| number[corner as usize]);
+        if !solid.diagonals.is_empty() {
+            let pairs = [(0, 1), (0, 2), (1, 2), (0, 3), (1, 3), (2, 3)];
+            let within = pairs.iter().enumerate().filter(|(_, pair)| pair.1 < sorted.len());
+            hidden.push(within.fold(0u8, |bits, (bit, pair)| {
+                bits | u8::from(!solid.is_edge(sorted[pair.0], sorted[pair.1])) << bit
+            }));
+        }
+        for corner in sorted.into_iter().map(|corner| number[corner as usize]) {
             codes.push(next - corner);
             next = next.max(corner + 1);
         }
@@ -150,6 +156,7 @@ pub fn topology(solid: &Solid, order: &Order) -> Packed {
     for plane in 0..planes {
         bytes.extend(codes.iter().map(|code| (code >> (8 * plane)) as u8));
     }
+    bytes.extend(hidden);
     let points = solid.source.as_ref().unwrap_or(&solid.points);
     let bounds = positions(points, order, &mut bytes);
     Packed {
@@ -223,5 +230,6 @@ pub fn same_mesh(left: &Solid, right: &Solid) -> bool {
     left.source.is_some()
         && left.tetrahedra == right.tetrahedra
         && left.triangles == right.triangles
+        && left.diagonals == right.diagonals
         && left.source == right.source
 }

@@ -14,6 +14,7 @@ use super::plot::{Chart, svg};
 use super::rate::Fit;
 use super::row::{Row, label};
 use super::{ReportError, table};
+use crate::experiment::claims::CLAIMS;
 use crate::experiment::file::Experiment;
 use crate::experiment::job::JobPart;
 use crate::experiment::record::Status;
@@ -25,6 +26,7 @@ use std::fmt::Write;
 pub fn write(
     experiment: &Experiment,
     rows: &[Row],
+    planned: usize,
     fits: &[Fit],
     verdicts: &[Verdict],
     charts: &[Chart],
@@ -65,7 +67,7 @@ pub fn write(
         let _ = write!(page, "<p class=\"lead\">{}</p>", escape(&experiment.description));
     }
     page.push_str(&claims(experiment));
-    page.push_str(&summary(rows, verdicts));
+    page.push_str(&summary(rows, planned, verdicts));
     page.push_str("</header>\n<nav aria-label=\"Sections\"><ul>");
     for (id, name, _) in &sections {
         let _ = write!(page, "<li><a href=\"#{id}\">{name}</a></li>");
@@ -87,14 +89,21 @@ fn plural(count: usize, one: &str, several: &str) -> String {
     format!("{count} {}", if count == 1 { one } else { several })
 }
 
+/// The papers' claims that the experiment tests; whether they hold is for the expectations to say.
 fn claims(experiment: &Experiment) -> String {
     if experiment.claims.is_empty() {
         return String::new();
     }
-    format!("<p>Reproduces {}.</p>", escape(&experiment.claims.join(", ")))
+    let mut text = String::from("<ul class=\"claims\">");
+    for id in &experiment.claims {
+        let claim = CLAIMS.iter().find(|claim| claim.id == id);
+        let meaning = claim.map_or("", |claim| claim.text);
+        let _ = write!(text, "<li><b>{}</b> {}</li>", escape(id), escape(meaning));
+    }
+    text + "</ul>"
 }
 
-fn summary(rows: &[Row], verdicts: &[Verdict]) -> String {
+fn summary(rows: &[Row], planned: usize, verdicts: &[Verdict]) -> String {
     let count = |status| rows.iter().filter(|row| row.record.result.status == status).count();
     let met = verdicts
         .iter()
@@ -125,16 +134,22 @@ fn summary(rows: &[Row], verdicts: &[Verdict]) -> String {
         );
     }
     let done = count(Status::Done);
-    let (class, mark) = if count(Status::Failed) > 0 {
+    let absent = planned.saturating_sub(rows.len());
+    let (class, mark) = if count(Status::Failed) > 0 || absent > 0 {
         ("ill", "\u{2717}")
     } else {
         ("well", "\u{2713}")
     };
     let _ = write!(
         text,
-        "<li class=\"{class}\"><b>{mark} {done} of {}</b><span>jobs done</span></li>",
-        rows.len()
+        "<li class=\"{class}\"><b>{mark} {done} of {planned}</b><span>jobs done</span></li>"
     );
+    if absent > 0 {
+        let _ = write!(
+            text,
+            "<li class=\"ill\"><b>{absent}</b><span>not computed yet</span></li>"
+        );
+    }
     for (status, word) in [
         (Status::Failed, "failed"),
         (Status::Refused, "refused"),
@@ -203,8 +218,8 @@ fn expectations(verdicts: &[Verdict]) -> String {
 }
 
 /// A rate with a true minus sign.
-fn rate(value: f64) -> String {
-    super::rate::shown(value).replace('-', "\u{2212}")
+fn rate(value: f64, standard_error: Option<f64>) -> String {
+    super::rate::shown(value, standard_error).replace('-', "\u{2212}")
 }
 
 fn rates(fits: &[Fit]) -> String {
@@ -216,19 +231,26 @@ fn rates(fits: &[Fit]) -> String {
     if spread {
         text.push_str("<th scope=\"col\">over seeds</th>");
     }
-    text.push_str("<th scope=\"col\">window</th><th scope=\"col\">expected</th></tr></thead><tbody>");
+    let windowed = fits.iter().any(|fit| fit.window.is_some());
+    let gated = fits.iter().any(|fit| fit.expect.is_some());
+    for (used, name) in [(windowed, "window"), (gated, "expected")] {
+        if used {
+            let _ = write!(text, "<th scope=\"col\">{name}</th>");
+        }
+    }
+    text.push_str("</tr></thead><tbody>");
     for fit in fits {
         let slope = match fit.line {
             Some(line) => {
                 let error = line
                     .standard_error
                     .map_or_else(String::new, |error| format!(" \u{b1} {}", round(error, 2).unicode()));
-                format!("<b>{}</b>{error}", rate(line.slope))
+                format!("<b>{}</b>{error}", rate(line.slope, line.standard_error))
             }
             None => "<i>none</i>".into(),
         };
         let points = if fit.left_out > 0 {
-            format!("{} ({} without figure)", fit.points.len(), fit.left_out)
+            format!("{} ({} left out)", fit.points.len(), fit.left_out)
         } else {
             fit.points.len().to_string()
         };
@@ -247,18 +269,24 @@ fn rates(fits: &[Fit]) -> String {
             escape(&fit.y),
             escape(&fit.x),
             escape(&fit.series),
-            fit.last_pair.map_or_else(String::new, rate)
+            fit.last_pair.map_or_else(String::new, |last| rate(last, None))
         );
         if spread {
             let seeds = fit.spread.map_or_else(String::new, |(low, high, count)| {
-                format!("{} to {} ({count})", rate(low), rate(high))
+                format!("{} to {} ({count})", rate(low, None), rate(high, None))
             });
             let _ = write!(text, "<td class=\"number\">{seeds}</td>");
         }
         let window = fit.window.map_or_else(String::new, |[low, high]| {
             format!("{} to {}", round(low, 4).unicode(), round(high, 4).unicode())
         });
-        let _ = write!(text, "<td class=\"number\">{window}</td><td>{expected}</td></tr>");
+        if windowed {
+            let _ = write!(text, "<td class=\"number\">{window}</td>");
+        }
+        if gated {
+            let _ = write!(text, "<td>{expected}</td>");
+        }
+        text.push_str("</tr>");
     }
     text.push_str(
         "</tbody></table></div><figcaption><p>Slope of log y against log x by least squares with its standard error; \

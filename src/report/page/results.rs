@@ -276,6 +276,7 @@ impl<'a> Embedded<'a> {
                     "points": points,
                     "cells": cells,
                     "corners": if solid.is_volume() { 4 } else { 3 },
+                    "diagonals": !solid.diagonals.is_empty(),
                     "box": packed.boxes[0],
                 }));
                 let _ = writeln!(

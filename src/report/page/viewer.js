@@ -47,7 +47,9 @@
         else { neighbour[t + f] = other >> 2; neighbour[other] = t >> 2; open.delete(key); }
       }
     }
-    return topologies[k] = { c, n: m.cells, cells, neighbour, source: positions(bytes, planes * n, m.points, m.box) };
+    // Which pairs of a cell's corners are no edges, as bits.
+    const at = planes * n, hidden = m.diagonals ? bytes.subarray(at, at + m.cells) : null;
+    return topologies[k] = { c, n: m.cells, cells, neighbour, hidden, source: positions(bytes, at + (hidden ? m.cells : 0), m.points, m.box) };
   };
   const result = async j => {
     if (results[j]) return results[j];
@@ -107,13 +109,18 @@ o=vec4(mix(c*s,vec3(.05),k*wire),1.);}`));
 
   // Fills the buffer: boundary faces and, where a plane cuts, either its section or the faces of the cells it leaves.
   const build = () => {
-    const { mesh, fields, inverted } = shown, { c, n, cells, neighbour } = mesh, out = [];
+    const { mesh, fields, inverted } = shown, { c, n, cells, neighbour, hidden } = mesh, out = [];
     const field = fields[state.field], cut = plane(), on = !!state.cut && c === 4;
     const high = v => cut[0] * points[3 * v] + cut[1] * points[3 * v + 1] + cut[2] * points[3 * v + 2] - cut[3];
     const value = t => field ? (field[t] === 127 ? -1 : field[t] / data.levels) : .35;
     const corner = (p, i, t, e, cap) => out.push(p[0], p[1], p[2], value(t), ...e[i], inverted[t] + cap);
-    const E = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
+    const E = [[1, 0, 0], [0, 1, 0], [0, 0, 1]], N = [[1, 1, 1], [1, 1, 1], [1, 1, 1]];
     const at = v => points.subarray(3 * v, 3 * v + 3);
+    // The coordinate that vanishes on a side which is no edge is raised.
+    const pair = [[0, 0, 1, 3], [0, 0, 2, 4], [1, 2, 0, 5], [3, 4, 5, 0]];
+    const face = (t, j) => {
+      for (let k = 0; k < 3; k++) corner(at(cells[c * t + j[k]]), k, t, hidden ? E.map((e, i) => e.map((x, a) => hidden[t] >> pair[j[(a + 1) % 3]][j[(a + 2) % 3]] & 1 ? 1 : x)) : E, 0);
+    };
     const removed = t => {
       let s = 0;
       for (let j = 0; j < 4; j++) s += high(cells[4 * t + j]);
@@ -122,13 +129,13 @@ o=vec4(mix(c*s,vec3(.05),k*wire),1.);}`));
     const gone = on && state.whole ? Uint8Array.from({ length: n }, (_, t) => removed(t)) : null;
     const whole = gone ? 2 : 0;
     if (c === 3) {
-      for (let t = 0; t < n; t++) for (let j = 0; j < 3; j++) corner(at(cells[3 * t + j]), j, t, E, 0);
+      for (let t = 0; t < n; t++) face(t, [0, 1, 2]);
     } else for (let t = 0; t < n; t++) {
       if (gone && gone[t]) continue;
       for (let f = 0; f < 4; f++) {
         const other = neighbour[4 * t + f];
         if (other >= 0 && !(gone && gone[other])) continue;
-        for (let j = 0, k = 0; j < 4; j++) if (j !== f) corner(at(cells[4 * t + j]), k++, t, E, 0);
+        face(t, [0, 1, 2, 3].filter(j => j !== f));
       }
     }
     if (on && !gone) for (let t = 0; t < n; t++) {
@@ -138,11 +145,11 @@ o=vec4(mix(c*s,vec3(.05),k*wire),1.);}`));
       const meet = ([a, h], [b, k]) => { const s = h / (h - k), p = at(a), q = at(b); return [0, 1, 2].map(i => p[i] + s * (q[i] - p[i])); };
       if (under.length !== 2) {
         const one = under.length === 1 ? under[0] : over[0], rest = under.length === 1 ? over : under;
-        rest.forEach((r, i) => corner(meet(one, r), i, t, E, 2));
+        rest.forEach((r, i) => corner(meet(one, r), i, t, hidden ? N : E, 2));
       } else {
         const q = [meet(under[0], over[0]), meet(under[0], over[1]), meet(under[1], over[1]), meet(under[1], over[0])];
         // The diagonal of a quadrilateral is no cell edge: the coordinate that vanishes on it is raised.
-        const F = [[1, 1, 0], [0, 1, 0], [0, 1, 1]], G = [[1, 0, 1], [0, 1, 1], [0, 0, 1]];
+        const F = hidden ? N : [[1, 1, 0], [0, 1, 0], [0, 1, 1]], G = hidden ? N : [[1, 0, 1], [0, 1, 1], [0, 0, 1]];
         [0, 1, 2].forEach(i => corner(q[i], i, t, F, 2));
         [0, 2, 3].forEach((k, i) => corner(q[k], i, t, G, 2));
       }

@@ -7,6 +7,8 @@ use super::solid::Solid;
 pub struct Facet {
     pub corners: Vec<[f64; 3]>,
     pub cell: u32,
+    /// Whether the side from each corner to the next is drawn.
+    pub sides: Vec<bool>,
     /// Lies in the cutting plane.
     pub section: bool,
 }
@@ -87,14 +89,16 @@ pub fn facets(solid: &Solid, points: &[[f64; 3]], plane: Option<&Plane>) -> Vec<
     let mut facets: Vec<Facet> = Vec::with_capacity(faces.len());
     for (face, cell) in faces {
         let corners: Vec<[f64; 3]> = face.iter().map(|&corner| at(corner)).collect();
-        let corners = match plane {
-            Some(plane) => clip(&corners, plane),
-            None => corners,
+        let sides = [0, 1, 2].map(|side| solid.is_edge(face[side], face[(side + 1) % 3]));
+        let (corners, sides) = match plane {
+            Some(plane) => clip(&corners, &sides, plane),
+            None => (corners, sides.to_vec()),
         };
         if corners.len() >= 3 {
             facets.push(Facet {
                 corners,
                 cell,
+                sides,
                 section: false,
             });
         }
@@ -104,6 +108,8 @@ pub fn facets(solid: &Solid, points: &[[f64; 3]], plane: Option<&Plane>) -> Vec<
         let corners = section(tetrahedron.map(at), plane);
         if corners.len() >= 3 {
             facets.push(Facet {
+                // Where cells were split into tetrahedra, their inner faces are no edges of the section.
+                sides: vec![solid.diagonals.is_empty(); corners.len()],
                 corners,
                 cell,
                 section: true,
@@ -117,19 +123,24 @@ fn between(from: [f64; 3], to: [f64; 3], share: f64) -> [f64; 3] {
     [0, 1, 2].map(|axis| from[axis] + share * (to[axis] - from[axis]))
 }
 
-fn clip(corners: &[[f64; 3]], plane: &Plane) -> Vec<[f64; 3]> {
+/// What the plane leaves of a polygon, and which of its sides are drawn: those of the polygon, and the cut.
+fn clip(corners: &[[f64; 3]], sides: &[bool], plane: &Plane) -> (Vec<[f64; 3]>, Vec<bool>) {
     let mut kept = Vec::with_capacity(4);
+    let mut drawn = Vec::with_capacity(4);
     for (index, &corner) in corners.iter().enumerate() {
         let next = corners[(index + 1) % corners.len()];
         let (here, there) = (plane.height(corner), plane.height(next));
         if here <= 0.0 {
             kept.push(corner);
+            drawn.push(sides[index]);
         }
         if (here <= 0.0) != (there <= 0.0) {
             kept.push(between(corner, next, here / (here - there)));
+            // Going out, the cut follows; coming in, the rest of the side.
+            drawn.push(here <= 0.0 || sides[index]);
         }
     }
-    kept
+    (kept, drawn)
 }
 
 /// The triangle or quadrilateral in which a plane meets a tetrahedron, corners in order around it.

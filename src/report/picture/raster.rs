@@ -31,6 +31,9 @@ fn unit(vector: Vector) -> Vector {
     }
 }
 
+/// Area in pixels of the facet in the middle by size, below which no edges are drawn.
+const SMALLEST_OUTLINED: f64 = 30.0;
+
 /// A picture in red, green, blue, opacity; the mesh fills it but for a margin. `eye` points from the mesh to the eye, the
 /// third axis upwards.
 pub fn render(
@@ -98,10 +101,29 @@ pub fn render(
             picture.triangle([corners[0], corners[index - 1], corners[index]], colour, inverted);
         }
     }
+    // Where cells are no larger than a few pixels, their edges would only blacken them.
+    let areas = facets.iter().map(|facet| {
+        let corners: Vec<Vector> = facet.corners.iter().map(|corner| screen(*corner)).collect();
+        let shares = (2..corners.len()).map(|index| {
+            let (a, b, c) = (corners[0], corners[index - 1], corners[index]);
+            0.5 * ((b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1])).abs()
+        });
+        shares.sum::<f64>()
+    });
+    let mut areas: Vec<f64> = areas.collect();
+    areas.sort_by(f64::total_cmp);
+    if areas
+        .get(areas.len() / 2)
+        .is_some_and(|&median| median < SMALLEST_OUTLINED)
+    {
+        return picture.pixels;
+    }
     for facet in facets {
         let corners: Vec<Vector> = facet.corners.iter().map(|corner| screen(*corner)).collect();
         for (index, corner) in corners.iter().enumerate() {
-            picture.edge(*corner, corners[(index + 1) % corners.len()]);
+            if facet.sides[index] {
+                picture.edge(*corner, corners[(index + 1) % corners.len()]);
+            }
         }
     }
     picture.pixels

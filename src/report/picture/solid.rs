@@ -16,6 +16,8 @@ pub struct Solid {
     pub fields: Vec<Field>,
     /// Whether the cell is inverted, one for each simplex.
     pub inverted: Vec<bool>,
+    /// Edges of simplices that are diagonals of quadrilateral faces and no edges of cells: corners ascending, sorted.
+    pub diagonals: Vec<[u32; 2]>,
 }
 
 /// One value for each simplex.
@@ -70,6 +72,9 @@ impl Solid {
                     solid.tetrahedra.push([cell[0], cell[1], cell[2], cell[3]]);
                 } else {
                     split(cell, faces, &mut solid.tetrahedra);
+                    let quads = faces.iter().filter(|face| face.len() == 4);
+                    let corners = quads.map(|face| [0, 1, 2, 3].map(|corner| cell[face[corner]]));
+                    solid.diagonals.extend(corners.map(diagonal));
                 }
                 owners.resize(solid.tetrahedra.len(), surface + index);
             }
@@ -80,9 +85,12 @@ impl Solid {
             }
             for (index, cell) in content.quads.iter().enumerate() {
                 solid.triangles.extend(halves(*cell));
+                solid.diagonals.push(diagonal(*cell));
                 owners.resize(solid.triangles.len(), content.triangles.len() + index);
             }
         }
+        solid.diagonals.sort_unstable();
+        solid.diagonals.dedup();
         for field in content.cell_data.iter().filter(|field| field.components == 1) {
             let value = |&owner: &usize| field.values.get(owner).copied().unwrap_or(f64::NAN);
             let values: Vec<f64> = owners.iter().map(value).collect();
@@ -97,6 +105,11 @@ impl Solid {
         }
         solid.inverted.resize(owners.len(), false);
         solid
+    }
+
+    /// Whether two corners of a simplex are joined by an edge of a cell.
+    pub fn is_edge(&self, from: u32, to: u32) -> bool {
+        self.diagonals.binary_search(&[from.min(to), from.max(to)]).is_err()
     }
 
     pub fn is_volume(&self) -> bool {
@@ -132,6 +145,12 @@ fn halves(quad: [u32; 4]) -> [[u32; 3]; 2] {
     let lowest = (0..4).min_by_key(|&corner| quad[corner]).unwrap_or(0);
     let at = |offset: usize| quad[(lowest + offset) % 4];
     [[at(0), at(1), at(2)], [at(0), at(2), at(3)]]
+}
+
+/// The diagonal at which [`halves`] splits, corners ascending.
+fn diagonal(quad: [u32; 4]) -> [u32; 2] {
+    let [[from, _, to], _] = halves(quad);
+    [from.min(to), from.max(to)]
 }
 
 /// Joins the lowest corner of a cell with every triangle of the faces that do not touch it.

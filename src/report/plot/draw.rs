@@ -139,16 +139,28 @@ struct Layout {
     named: bool,
 }
 
-/// Series names longer than this are cut, with an ellipsis.
-const LONGEST_NAME: usize = 30;
+/// Series names longer than this are cut, with an ellipsis in each of their longest parts.
+const LONGEST_NAME: usize = 42;
 
 fn short(name: &str) -> String {
-    if name.chars().count() <= LONGEST_NAME {
-        return name.to_string();
-    }
-    let mut text: String = name.chars().take(LONGEST_NAME - 1).collect();
-    text.push('\u{2026}');
-    text
+    let parts: Vec<&str> = name.split(", ").collect();
+    let length = |part: &str| part.chars().count();
+    let whole = |most: usize| -> usize {
+        parts.iter().map(|part| length(part).min(most)).sum::<usize>() + 2 * (parts.len() - 1)
+    };
+    // The longest parts give way first, so that the others still tell the series apart.
+    let most = (3..=length(name))
+        .rev()
+        .find(|&most| whole(most) <= LONGEST_NAME)
+        .unwrap_or(3);
+    let cut = |part: &&str| {
+        if length(part) <= most {
+            return part.to_string();
+        }
+        let kept: String = part.chars().take(most - 1).collect();
+        kept + "\u{2026}"
+    };
+    parts.iter().map(cut).collect::<Vec<_>>().join(", ")
 }
 
 /// Height of the canvas: enough for the names of all series one below the other.

@@ -1,7 +1,8 @@
 //! Tables as the experiment file asks for them: rows of axis values, columns of figures, printed figures beside ours.
 //!
 //! Every job of the table's condition is in it. A job without a figure has the word for its end in the cell and its reason in
-//! a note. Several jobs in one row (axes that are not in `rows`) give their mean and sample standard deviation.
+//! a note. Several jobs in one cell (axes that are neither in `rows` nor `across`) give their mean and sample standard
+//! deviation.
 
 pub mod csv;
 pub mod html;
@@ -131,7 +132,7 @@ impl Notes {
     }
 }
 
-/// The jobs behind one line of the table.
+/// The jobs behind one line of the table, or behind one cell of it.
 struct Line<'a> {
     axes: Vec<Option<&'a Value>>,
     jobs: Vec<&'a Row>,
@@ -140,12 +141,31 @@ struct Line<'a> {
 /// The table that the file's `[[table]]` asks for.
 pub fn build(experiment: &Experiment, table: &Table, rows: &[Row]) -> Grid {
     let lines = lines(table, rows);
-    let quantities: Vec<Quantity> = table
-        .columns
+    let across = across(table, rows);
+    let mut quantities: Vec<Quantity> = Vec::new();
+    for name in &table.columns {
+        quantities.extend(across.iter().map(|values| {
+            let mut quantity = Quantity::find(experiment, name);
+            quantity.name += &values.suffix;
+            quantity
+        }));
+    }
+    // The jobs of each cell, and the figure that is asked of them.
+    let parts: Vec<Vec<Line>> = lines
         .iter()
-        .map(|name| Quantity::find(experiment, name))
+        .map(|line| {
+            let columns = table.columns.iter().flat_map(|_| &across);
+            columns.map(|values| values.part(table, line)).collect()
+        })
         .collect();
-    let printed: Vec<Vec<Option<Printed>>> = lines.iter().map(|line| printed_figures(table, line)).collect();
+    let name_of = |column: usize| table.columns[column / across.len()].as_str();
+    let printed: Vec<Vec<Option<Printed>>> = parts
+        .iter()
+        .map(|parts| {
+            let printed = |(column, part): (usize, &Line)| printed_figure(table, part, name_of(column));
+            parts.iter().enumerate().map(printed).collect()
+        })
+        .collect();
     let has_printed: Vec<bool> = (0..quantities.len())
         .map(|column| printed.iter().any(|line| line[column].is_some()))
         .collect();
@@ -153,7 +173,7 @@ pub fn build(experiment: &Experiment, table: &Table, rows: &[Row]) -> Grid {
     let mut notes = Notes::default();
     let mut body = Vec::new();
     let mut any_best = false;
-    let best = best_figures(&lines, &quantities);
+    let best = best_figures(experiment, &parts, &quantities, &name_of);
     for (index, line) in lines.iter().enumerate() {
         let mut cells: Vec<Cell> = line
             .axes
@@ -161,7 +181,7 @@ pub fn build(experiment: &Experiment, table: &Table, rows: &[Row]) -> Grid {
             .map(|value| Cell::new(Content::Text(value.map_or_else(String::new, label))))
             .collect();
         for (column, quantity) in quantities.iter().enumerate() {
-            let mut cell = figure(line, quantity, &mut notes);
+            let mut cell = figure(&parts[index][column], name_of(column), quantity, &mut notes);
             cell.best = best[index][column];
             any_best |= cell.best;
             let ours = match cell.content {
@@ -191,7 +211,7 @@ pub fn build(experiment: &Experiment, table: &Table, rows: &[Row]) -> Grid {
         head: head(table, &quantities, &has_printed),
         body,
         notes: notes.0,
-        legend: legend(table, &quantities, &lines, any_best),
+        legend: legend(table, &quantities, &parts, any_best),
     }
 }
 
@@ -211,7 +231,64 @@ fn lines<'a>(table: &Table, rows: &'a [Row]) -> Vec<Line<'a>> {
             None => lines.push(Line { axes, jobs: vec![row] }),
         }
     }
+    // Values stand in the order of the file, the first axis changing most slowly.
+    let mut values: Vec<Vec<&Value>> = vec![Vec::new(); table.rows.len()];
+    for line in &lines {
+        for (known, value) in values.iter_mut().zip(&line.axes) {
+            known.extend(value.filter(|value| !known.iter().any(|other| same(other, value))));
+        }
+    }
+    let rank = |line: &Line| -> Vec<Option<usize>> {
+        let places = line.axes.iter().zip(&values);
+        places
+            .map(|(value, known)| value.and_then(|value| known.iter().position(|other| same(other, value))))
+            .collect()
+    };
+    lines.sort_by_cached_key(rank);
     lines
+}
+
+/// Values of the axes across, and how they are written in a heading.
+struct Across<'a> {
+    values: Vec<Option<&'a Value>>,
+    suffix: String,
+}
+
+impl<'a> Across<'a> {
+    /// The jobs of a line that have these values.
+    fn part(&self, table: &Table, line: &Line<'a>) -> Line<'a> {
+        let has = |job: &&&Row| {
+            let own = table.across.iter().map(|axis| job.axis(axis));
+            own.zip(&self.values).all(|(own, value)| own == *value)
+        };
+        Line {
+            axes: line.axes.clone(),
+            jobs: line.jobs.iter().filter(has).copied().collect(),
+        }
+    }
+}
+
+/// Every combination of values across that occurs, in the order of the jobs; one of none where the table has no such axes.
+fn across<'a>(table: &Table, rows: &'a [Row]) -> Vec<Across<'a>> {
+    let mut found: Vec<Across> = Vec::new();
+    for row in rows.iter().filter(|row| row.matches(&table.condition)) {
+        let values: Vec<Option<&Value>> = table.across.iter().map(|axis| row.axis(axis)).collect();
+        if found.iter().any(|other| other.values == values) {
+            continue;
+        }
+        let short = |axis: &str| axis.rsplit('.').next().unwrap_or(axis).to_string();
+        let parts = table.across.iter().zip(&values);
+        let suffix = parts.map(|(axis, value)| format!(", {} {}", short(axis), value.map_or_else(String::new, label)));
+        let suffix = suffix.collect();
+        found.push(Across { values, suffix });
+    }
+    if found.is_empty() {
+        found.push(Across {
+            values: vec![None; table.across.len()],
+            suffix: String::new(),
+        });
+    }
+    found
 }
 
 fn head(table: &Table, quantities: &[Quantity], has_printed: &[bool]) -> Vec<Head> {
@@ -257,19 +334,18 @@ fn figures(line: &Line, name: &str) -> Vec<f64> {
         .collect()
 }
 
-fn figure(line: &Line, quantity: &Quantity, notes: &mut Notes) -> Cell {
-    let values = figures(line, &quantity.name);
+fn figure(line: &Line, name: &str, quantity: &Quantity, notes: &mut Notes) -> Cell {
+    if line.jobs.is_empty() {
+        return Cell::new(Content::Empty);
+    }
+    let values = figures(line, name);
     let troubled = line.jobs.iter().find(|job| job.remarkable());
     let mark = troubled.map(|job| notes.mark(note(job, line.jobs.len())));
     let content = if values.is_empty() {
         match troubled {
             Some(job) => Content::Absent(word(job).into()),
             None => Content::Absent(
-                if line
-                    .jobs
-                    .iter()
-                    .any(|job| job.record.result.metrics.contains_key(&quantity.name))
-                {
+                if line.jobs.iter().any(|job| job.record.result.metrics.contains_key(name)) {
                     "undefined"
                 } else {
                     "absent"
@@ -329,12 +405,19 @@ pub fn mean_and_deviation(values: &[f64]) -> (f64, f64) {
     (mean, (squares / (count - 1.0)).sqrt())
 }
 
-/// Marks the best figure of each group: the lines that differ in the last row axis only.
-fn best_figures(lines: &[Line], quantities: &[Quantity]) -> Vec<Vec<bool>> {
-    let mut best = vec![vec![false; quantities.len()]; lines.len()];
+/// Marks the best figure of each group, the lines that differ in the last row axis only. Figures that print alike are
+/// equally good.
+fn best_figures<'a>(
+    experiment: &Experiment,
+    parts: &[Vec<Line>],
+    quantities: &[Quantity],
+    name_of: &dyn Fn(usize) -> &'a str,
+) -> Vec<Vec<bool>> {
+    let mut best = vec![vec![false; quantities.len()]; parts.len()];
     // Along numbers a table is a study, not a contest.
-    if lines
+    if parts
         .iter()
+        .flatten()
         .all(|line| line.axes.last().is_none_or(|value| value.is_some_and(Value::is_number)))
     {
         return best;
@@ -346,8 +429,8 @@ fn best_figures(lines: &[Line], quantities: &[Quantity]) -> Vec<Vec<bool>> {
             Better::Neither => continue,
         };
         let mut groups: BTreeMap<String, Vec<(usize, f64)>> = BTreeMap::new();
-        for (index, line) in lines.iter().enumerate() {
-            let values = figures(line, &quantity.name);
+        for (index, line) in parts.iter().map(|parts| &parts[column]).enumerate() {
+            let values = figures(line, name_of(column));
             if values.is_empty() || line.jobs.iter().any(|job| !job.done()) {
                 continue;
             }
@@ -361,12 +444,21 @@ fn best_figures(lines: &[Line], quantities: &[Quantity]) -> Vec<Vec<bool>> {
                 .push((index, sign * mean_and_deviation(&values).0));
         }
         for group in groups.values() {
+            let apart = experiment.method.incomparable(name_of(column));
+            let kinds = group.iter().flat_map(|&(index, _)| &parts[index][column].jobs);
+            let kinds: Vec<Vec<Option<&Value>>> = kinds
+                .map(|job| apart.iter().map(|axis| job.axis(axis)).collect())
+                .collect();
+            if kinds.windows(2).any(|pair| pair[0] != pair[1]) {
+                continue;
+            }
             let lowest = group.iter().map(|entry| entry.1).fold(f64::INFINITY, f64::min);
-            let winners = group.iter().filter(|entry| entry.1 == lowest).count();
+            let printed = |value: f64| super::number::round(value, quantity.digits);
+            let is_best = |value: f64| value == lowest || printed(value) == printed(lowest);
             // A column in which all are equal has no best.
-            if winners < group.len() {
-                for (index, value) in group {
-                    best[*index][column] = *value == lowest;
+            if !group.iter().all(|entry| is_best(entry.1)) {
+                for &(index, value) in group {
+                    best[index][column] = is_best(value);
                 }
             }
         }
@@ -439,10 +531,9 @@ impl Printed {
     }
 }
 
-fn printed_figures(table: &Table, line: &Line) -> Vec<Option<Printed>> {
-    let none = || table.columns.iter().map(|_| None).collect();
+fn printed_figure(table: &Table, line: &Line, column: &str) -> Option<Printed> {
     let (Some(published), Some(job)) = (&table.published, line.jobs.first()) else {
-        return none();
+        return None;
     };
     let is_column = |name: &str| table.columns.iter().any(|column| column == name);
     let row = published.rows.iter().find(|row| {
@@ -450,20 +541,16 @@ fn printed_figures(table: &Table, line: &Line) -> Vec<Option<Printed>> {
             .filter(|(name, _)| !is_column(name) && name.as_str() != "tolerance")
             .all(|(name, value)| job.axis(name).is_some_and(|own| same(own, value)))
     });
-    let Some(row) = row else { return none() };
-    let tolerance = row.get("tolerance").and_then(Value::as_f64).unwrap_or(TOLERANCE);
-    let printed = |column: &String| {
-        let value = row.get(column)?;
-        Some(Printed {
-            value: value.as_f64()?,
-            text: value.to_string(),
-            tolerance,
-        })
-    };
-    table.columns.iter().map(printed).collect()
+    let row = row?;
+    let value = row.get(column)?;
+    Some(Printed {
+        value: value.as_f64()?,
+        text: value.to_string(),
+        tolerance: row.get("tolerance").and_then(Value::as_f64).unwrap_or(TOLERANCE),
+    })
 }
 
-fn legend(table: &Table, quantities: &[Quantity], lines: &[Line], any_best: bool) -> Vec<String> {
+fn legend(table: &Table, quantities: &[Quantity], parts: &[Vec<Line>], any_best: bool) -> Vec<String> {
     let mut legend = Vec::new();
     if quantities.iter().any(|quantity| quantity.measured) {
         legend.push("Figures to four significant digits, measurements to three; jobs.csv holds them unrounded.".into());
@@ -478,7 +565,7 @@ fn legend(table: &Table, quantities: &[Quantity], lines: &[Line], any_best: bool
             }
         });
     }
-    if lines.iter().any(|line| line.jobs.len() > 1) {
+    if parts.iter().flatten().any(|line| line.jobs.len() > 1) {
         legend.push("A \u{b1} B (n): mean and sample standard deviation of n jobs.".into());
     }
     if let Some(published) = &table.published {

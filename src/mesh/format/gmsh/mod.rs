@@ -21,7 +21,18 @@ const MOST_SPARSE: usize = 8;
 
 /// Whether the first word is that of a Gmsh file.
 pub(super) fn sniff(bytes: &[u8]) -> bool {
-    bytes.trim_ascii_start().starts_with(b"$MeshFormat")
+    version(bytes).is_some_and(|rest| !rest.starts_with(b"2"))
+}
+
+/// Whether the header says version 2.
+pub(super) fn sniff2(bytes: &[u8]) -> bool {
+    version(bytes).is_some_and(|rest| rest.starts_with(b"2"))
+}
+
+/// What follows the first header's name.
+fn version(bytes: &[u8]) -> Option<&[u8]> {
+    let rest = bytes.trim_ascii_start().strip_prefix(b"$MeshFormat")?;
+    Some(rest.trim_ascii_start())
 }
 
 /// Tags of nodes or elements, and the row of each.

@@ -1,0 +1,194 @@
+//! Time of the restricted Voronoi diagram with the centroidal energy and its gradient, on one thread and on several.
+//!
+//! `cargo bench --bench restricted_voronoi -- [surface.obj] [sites...]`; a bumpy torus of 60k triangles and 1k, 10k and 100k
+//! sites by default. Sites are spread at random and relaxed by Lloyd's iteration. Each figure is the best of several runs.
+
+use std::time::Instant;
+use vargeo::geometry::point_tree::PointTree;
+use vargeo::geometry::squared_distance::{Anisotropy, Options, SquaredDistance, Wanted};
+
+fn torus(n: usize, m: usize) -> (Vec<[f64; 3]>, Vec<[u32; 3]>) {
+    let mut points = Vec::new();
+    let mut cells = Vec::new();
+    for i in 0..n {
+        for j in 0..m {
+            let (a, b) = (i as f64 / n as f64 * 6.283185307, j as f64 / m as f64 * 6.283185307);
+            let radius = 0.35 * (1.0 + 0.1 * (7.0 * a).sin() * (5.0 * b).cos());
+            let ring = 1.0 + radius * b.cos();
+            points.push([ring * a.cos(), ring * a.sin(), radius * b.sin()]);
+            let at = |i: usize, j: usize| ((i % n) * m + j % m) as u32;
+            cells.push([at(i, j), at(i + 1, j), at(i + 1, j + 1)]);
+            cells.push([at(i, j), at(i + 1, j + 1), at(i, j + 1)]);
+        }
+    }
+    (points, cells)
+}
+
+fn read(path: &str) -> (Vec<[f64; 3]>, Vec<[u32; 3]>) {
+    let text = std::fs::read_to_string(path).expect("a readable file");
+    let (mut points, mut cells) = (Vec::new(), Vec::new());
+    for line in text.lines() {
+        let mut words = line.split_whitespace();
+        match words.next() {
+            Some("v") => points.push(std::array::from_fn(|_| {
+                words.next().and_then(|w| w.parse().ok()).expect("a number")
+            })),
+            Some("f") => cells.push(std::array::from_fn(|_| {
+                let index: u32 = words
+                    .next()
+                    .and_then(|w| w.split('/').next())
+                    .and_then(|w| w.parse().ok())
+                    .expect("an index");
+                index - 1
+            })),
+            _ => {}
+        }
+    }
+    (points, cells)
+}
+
+/// Random points on the surface, evenly by area.
+fn spread(points: &[[f64; 3]], cells: &[[u32; 3]], count: usize) -> Vec<[f64; 3]> {
+    let mut state = 7u64;
+    let mut random = || {
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (state >> 11) as f64 / (1u64 << 53) as f64
+    };
+    let mut sums = vec![0.0];
+    for cell in cells {
+        let [a, b, c] = cell.map(|v| points[v as usize]);
+        let (x, y): ([f64; 3], [f64; 3]) = (
+            std::array::from_fn(|k| b[k] - a[k]),
+            std::array::from_fn(|k| c[k] - a[k]),
+        );
+        let n = [
+            x[1] * y[2] - x[2] * y[1],
+            x[2] * y[0] - x[0] * y[2],
+            x[0] * y[1] - x[1] * y[0],
+        ];
+        let area = n.iter().map(|n| n * n).sum::<f64>().sqrt();
+        sums.push(sums[sums.len() - 1] + area);
+    }
+    (0..count)
+        .map(|_| {
+            let place = random() * sums[sums.len() - 1];
+            let triangle = sums.partition_point(|&sum| sum <= place).clamp(1, cells.len()) - 1;
+            let (mut s, mut t) = (random(), random());
+            if s + t > 1.0 {
+                (s, t) = (1.0 - s, 1.0 - t);
+            }
+            let [a, b, c] = cells[triangle].map(|v| points[v as usize]);
+            std::array::from_fn(|k| a[k] + s * (b[k] - a[k]) + t * (c[k] - a[k]))
+        })
+        .collect()
+}
+
+/// Seconds that this thread has run, so that other load does not count; wall time where the system does not tell.
+fn clock(start: Instant) -> f64 {
+    let told = std::fs::read_to_string("/proc/thread-self/schedstat").ok();
+    match told
+        .as_deref()
+        .and_then(|text| text.split(' ').next())
+        .and_then(|word| word.parse::<f64>().ok())
+    {
+        Some(nanoseconds) => nanoseconds * 1e-9,
+        None => start.elapsed().as_secs_f64(),
+    }
+}
+
+/// Milliseconds of the quickest run: of this thread alone, or by the clock on the wall.
+fn best(runs: usize, alone: bool, mut work: impl FnMut()) -> f64 {
+    let start = Instant::now();
+    let now = || {
+        if alone {
+            clock(start)
+        } else {
+            start.elapsed().as_secs_f64()
+        }
+    };
+    (0..runs).fold(f64::INFINITY, |best, _| {
+        let begin = now();
+        work();
+        best.min((now() - begin) * 1e3)
+    })
+}
+
+fn main() {
+    let words: Vec<String> = std::env::args().skip(1).filter(|word| !word.starts_with('-')).collect();
+    let file = words.iter().find(|word| word.ends_with(".obj"));
+    let mut counts: Vec<usize> = words.iter().filter_map(|word| word.parse().ok()).collect();
+    if counts.is_empty() {
+        counts = vec![1_000, 10_000, 100_000];
+    }
+    let (points, cells) = file.map_or_else(|| torus(300, 100), |file| read(file));
+    println!("{} triangles; milliseconds", cells.len());
+    println!(
+        "{:>8} {:>7} {:>9} {:>9} {:>9} {:>9} {:>9} {:>8}",
+        "sites", "threads", "tree", "value", "gradient", "s=50", "surface", "pieces"
+    );
+    for &count in &counts {
+        let mut sites = spread(&points, &cells, count);
+        let mut term = SquaredDistance::new(&points, &cells).expect("a valid surface");
+        let mut tree = PointTree::default();
+        let mut areas = vec![0.0; count];
+        let mut moments = vec![[0.0; 3]; count];
+        for _ in 0..20 {
+            tree.set(&sites);
+            let wanted = Wanted {
+                areas: Some(&mut areas),
+                moments: Some(&mut moments),
+                ..Wanted::default()
+            };
+            term.evaluate(&points, &tree, &Options::default(), wanted);
+            for ((site, area), moment) in sites.iter_mut().zip(&areas).zip(&moments) {
+                if *area > 0.0 {
+                    *site = moment.map(|x| x / area);
+                }
+            }
+        }
+        let mut pieces = 0;
+        term.diagram().pieces(&points, &tree, None, |_| pieces += 1);
+        for threads in [1, 2] {
+            let pool = rayon::ThreadPoolBuilder::new()
+                .num_threads(threads)
+                .build()
+                .expect("threads");
+            let runs = 10;
+            pool.install(|| {
+                let mut gradient = vec![[0.0; 3]; count];
+                let build = best(runs, threads == 1, || tree.set(&sites));
+                let plain = Options::default();
+                let stretched = Options {
+                    anisotropy: Anisotropy::Facets(50.0),
+                    ..Options::default()
+                };
+                let value = best(runs, threads == 1, || {
+                    term.evaluate(&points, &tree, &plain, Wanted::default());
+                });
+                let mut by_sites = |options: &Options<'_>| {
+                    best(runs, threads == 1, || {
+                        let wanted = Wanted {
+                            sites: Some(&mut gradient),
+                            ..Wanted::default()
+                        };
+                        term.evaluate(&points, &tree, options, wanted);
+                    })
+                };
+                let (gradient, anisotropic) = (by_sites(&plain), by_sites(&stretched));
+                let mut forces = vec![[0.0; 3]; points.len()];
+                let surface = best(runs, threads == 1, || {
+                    let wanted = Wanted {
+                        surface: Some(&mut forces),
+                        ..Wanted::default()
+                    };
+                    term.evaluate(&points, &tree, &plain, wanted);
+                });
+                println!(
+                    "{count:>8} {threads:>7} {build:>9.2} {value:>9.2} {gradient:>9.2} {anisotropic:>9.2} {surface:>9.2} {pieces:>8}"
+                );
+            });
+        }
+    }
+}

@@ -1,0 +1,232 @@
+//! The symmetric indefinite system in all fields at once, its unknowns numbered vertex by vertex.
+//!
+//! The vertices follow an order of nested dissection of the mesh, and the fields of a vertex stand side by side, so that
+//! pivots of size two stay within a vertex.
+
+use super::scheme::{Discretization, Mass};
+use crate::linalg::sparse::{Elimination, Graph, geometric_dissection};
+
+/// No unknown.
+const NONE: u32 = u32::MAX;
+
+/// A symmetric matrix: its lower triangle by columns, rows ascending, the diagonal first.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct LowerMatrix {
+    pub offsets: Vec<usize>,
+    pub rows: Vec<usize>,
+    pub values: Vec<f64>,
+}
+
+impl LowerMatrix {
+    pub fn dimension(&self) -> usize {
+        self.offsets.len() - 1
+    }
+
+    /// `A x`.
+    pub fn multiply(&self, x: &[f64]) -> Vec<f64> {
+        let mut result = vec![0.0; x.len()];
+        for column in 0..self.dimension() {
+            let mut sum = 0.0;
+            for place in self.offsets[column]..self.offsets[column + 1] {
+                let (row, value) = (self.rows[place], self.values[place]);
+                result[row] += value * x[column];
+                if row != column {
+                    sum += value * x[row];
+                }
+            }
+            result[column] += sum;
+        }
+        result
+    }
+
+    /// Largest sum of magnitudes in a row.
+    pub fn norm(&self) -> f64 {
+        let mut sums = vec![0.0; self.dimension()];
+        for column in 0..self.dimension() {
+            for place in self.offsets[column]..self.offsets[column + 1] {
+                sums[self.rows[place]] += self.values[place].abs();
+                if self.rows[place] != column {
+                    sums[column] += self.values[place].abs();
+                }
+            }
+        }
+        sums.into_iter().fold(0.0, f64::max)
+    }
+}
+
+/// The unknowns of the mixed system.
+pub struct Numbering {
+    /// Number of the unknown of each field `u`, `v`, `w` at each vertex.
+    index: Vec<[u32; 3]>,
+    /// Vertices with an unknown, in the order of their numbers.
+    order: Vec<u32>,
+    pub count: usize,
+    /// An unknown is its field's value divided by this, so that all coefficients have about the same size whatever the
+    /// edge length: pivots are chosen by size.
+    scale: [f64; 3],
+}
+
+/// The fields in the order in which a vertex's unknowns are numbered.
+const FIELDS: [usize; 3] = [1, 0, 2];
+
+impl Numbering {
+    pub fn new(discretization: &Discretization<'_>) -> Self {
+        let domain = discretization.domain;
+        let unknown = &discretization.unknown;
+        let vertices = domain.places.len();
+        let mut name = vec![NONE; vertices];
+        let mut with: Vec<u32> = Vec::new();
+        for vertex in 0..vertices {
+            if unknown.iter().any(|field| field[vertex]) {
+                name[vertex] = with.len() as u32;
+                with.push(vertex as u32);
+            }
+        }
+        let graph = Graph::of_cells(with.len(), &domain.mesh.cells, |vertex| {
+            Some(name[vertex as usize]).filter(|&index| index != NONE)
+        });
+        let points: Vec<[f64; 3]> = with.iter().map(|&vertex| domain.mesh.points[vertex as usize]).collect();
+        let elimination = Elimination::new(&graph, &geometric_dissection(&graph, &points), discretization.order);
+        let order: Vec<u32> = elimination.order().iter().map(|&place| with[place as usize]).collect();
+        let mut index = vec![[NONE; 3]; vertices];
+        let mut count = 0;
+        for &vertex in &order {
+            for field in FIELDS {
+                if unknown[field][vertex as usize] {
+                    index[vertex as usize][field] = count;
+                    count += 1;
+                }
+            }
+        }
+        Self {
+            index,
+            order,
+            count: count as usize,
+            scale: scale(discretization),
+        }
+    }
+
+    /// The values of a field taken from a solution with `components` columns; known values elsewhere.
+    pub fn field(&self, discretization: &Discretization<'_>, solution: &[f64], field: usize) -> Vec<f64> {
+        let components = discretization.components;
+        let mut values = discretization.known[field].clone();
+        for (vertex, index) in self.index.iter().enumerate() {
+            if index[field] != NONE {
+                for c in 0..components {
+                    let unknown = solution[c * self.count + index[field] as usize];
+                    values[vertex * components + c] = self.scale[field] * unknown;
+                }
+            }
+        }
+        values
+    }
+}
+
+/// With the mean lumped mass `m`, coefficients are of size 1 for `L`, `m` for `M` and `m^2` for `S`.
+fn scale(discretization: &Discretization<'_>) -> [f64; 3] {
+    let lumped = discretization.lumped();
+    let used = lumped.iter().filter(|&&mass| mass > 0.0);
+    let (sum, count) = used.fold((0.0, 0), |(sum, count), mass| (sum + mass, count + 1));
+    let mean: f64 = if count > 0 { sum / f64::from(count) } else { 1.0 };
+    if discretization.order == 2 {
+        [mean.sqrt(), 1.0 / mean.sqrt(), 1.0]
+    } else {
+        [mean, 1.0, 1.0 / mean]
+    }
+}
+
+/// Calls `visit(row field, column vertex, column field, coefficient)` for every coefficient in the rows of the
+/// unknowns of one vertex.
+fn coefficients(discretization: &Discretization<'_>, vertex: u32, mut visit: impl FnMut(usize, usize, usize, f64)) {
+    let operators = discretization.operators;
+    let lumped = (discretization.mass != Mass::Full).then(|| discretization.lumped());
+    let (u, v, w) = (0, 1, 2);
+    for place in operators.pattern.row(vertex) {
+        let other = operators.pattern.columns[place] as usize;
+        let laplacian = operators.laplacian[place];
+        let diagonal = other == vertex as usize;
+        let mass = match lumped {
+            None => operators.mass[place],
+            Some(lumped) if diagonal => lumped[other],
+            Some(_) => 0.0,
+        };
+        if discretization.order == 2 {
+            visit(v, other, v, -mass);
+            visit(v, other, u, laplacian);
+            visit(u, other, v, laplacian);
+        } else {
+            visit(v, other, v, laplacian);
+            visit(v, other, w, -mass);
+            visit(u, other, w, laplacian);
+            visit(w, other, v, -mass);
+            visit(w, other, u, laplacian);
+            if diagonal {
+                visit(w, other, w, discretization.penalty[other]);
+            }
+        }
+    }
+}
+
+/// The matrix.
+pub fn matrix(discretization: &Discretization<'_>, numbering: &Numbering) -> LowerMatrix {
+    let mut matrix = LowerMatrix {
+        offsets: Vec::with_capacity(numbering.count + 1),
+        ..LowerMatrix::default()
+    };
+    matrix.offsets.push(0);
+    let mut columns: [Vec<(u32, f64)>; 3] = Default::default();
+    for &vertex in &numbering.order {
+        let own = numbering.index[vertex as usize];
+        // The matrix is symmetric: a row's entries from the diagonal on are a column's.
+        coefficients(discretization, vertex, |row, other, column, value| {
+            let index = numbering.index[other][column];
+            if own[row] != NONE && index != NONE && index >= own[row] && (value != 0.0 || index == own[row]) {
+                columns[row].push((index, numbering.scale[row] * value * numbering.scale[column]));
+            }
+        });
+        for field in FIELDS {
+            if own[field] == NONE {
+                continue;
+            }
+            let entries = &mut columns[field];
+            if !entries.iter().any(|entry| entry.0 == own[field]) {
+                entries.push((own[field], 0.0));
+            }
+            entries.sort_unstable_by_key(|entry| entry.0);
+            matrix.rows.extend(entries.iter().map(|entry| entry.0 as usize));
+            matrix.values.extend(entries.iter().map(|entry| entry.1));
+            matrix.offsets.push(matrix.rows.len());
+        }
+        columns.iter_mut().for_each(Vec::clear);
+    }
+    matrix
+}
+
+/// The right-hand side: `components` columns, one after another.
+pub fn right_side(discretization: &Discretization<'_>, numbering: &Numbering) -> Vec<f64> {
+    let components = discretization.components;
+    let mut right = vec![0.0; numbering.count * components];
+    for &vertex in &numbering.order {
+        let own = numbering.index[vertex as usize];
+        let flux_field = if discretization.order == 2 { 1 } else { 2 };
+        for c in 0..components {
+            let at = vertex as usize * components + c;
+            if own[0] != NONE {
+                right[c * numbering.count + own[0] as usize] += numbering.scale[0] * discretization.load[at];
+            }
+            if own[flux_field] != NONE {
+                right[c * numbering.count + own[flux_field] as usize] -=
+                    numbering.scale[flux_field] * discretization.flux[at];
+            }
+        }
+        coefficients(discretization, vertex, |row, other, column, value| {
+            if own[row] != NONE && numbering.index[other][column] == NONE && value != 0.0 {
+                for c in 0..components {
+                    right[c * numbering.count + own[row] as usize] -=
+                        numbering.scale[row] * value * discretization.known[column][other * components + c];
+                }
+            }
+        });
+    }
+    right
+}

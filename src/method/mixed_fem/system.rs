@@ -1,0 +1,161 @@
+//! A factorized system, one-field or mixed, that turns conditions into solutions.
+
+use super::factorization::{Factorization, analyse, nullity};
+use super::mixed_system::{self, Numbering};
+use super::one_field::{self, OneField};
+use super::scheme::Discretization;
+use super::settings::Solver;
+use crate::method::Failure;
+use crate::optimize::Observer;
+
+/// A larger relative residual is taken as a breakdown of a factorization.
+const BROKEN: f64 = 1e-9;
+
+/// A system ready for right-hand sides.
+pub struct System {
+    form: Form,
+    factorization: Factorization,
+    pub factorizations: u64,
+    pub fallbacks: u64,
+    /// Whether a breakdown may still be answered with LU.
+    may_fall_back: bool,
+}
+
+enum Form {
+    OneField,
+    Mixed(Numbering),
+}
+
+/// The field `u` at every vertex, and the relative residual of the system.
+pub struct Solution {
+    pub values: Vec<f64>,
+    pub residual: f64,
+}
+
+impl System {
+    /// Assembles and factorizes.
+    ///
+    /// # Errors
+    /// When the matrix is singular, or memory runs out.
+    pub fn new(
+        discretization: &Discretization<'_>,
+        one_field: bool,
+        solver: Solver,
+        observer: &mut dyn Observer,
+    ) -> Result<Self, Failure> {
+        if one_field {
+            let system = OneField::new(discretization, observer)?;
+            let free: Vec<u32> = (0..discretization.unknown[0].len() as u32)
+                .filter(|&vertex| discretization.unknown[0][vertex as usize])
+                .collect();
+            observer.phase("factorize");
+            return Ok(Self {
+                form: Form::OneField,
+                factorization: Factorization::cholesky(system, &free)?,
+                factorizations: 1,
+                fallbacks: 0,
+                may_fall_back: false,
+            });
+        }
+        observer.phase("order");
+        let numbering = Numbering::new(discretization);
+        observer.phase("assemble");
+        let matrix = mixed_system::matrix(discretization, &numbering);
+        let factorization = if solver == Solver::Lu {
+            observer.phase("factorize");
+            Factorization::lu(matrix)?
+        } else {
+            observer.phase("analyse");
+            let analysis = analyse(&matrix)?;
+            observer.phase("factorize");
+            Factorization::lblt(matrix, analysis)?
+        };
+        Ok(Self {
+            form: Form::Mixed(numbering),
+            factorization,
+            factorizations: 1,
+            fallbacks: 0,
+            may_fall_back: solver == Solver::Auto,
+        })
+    }
+
+    /// Solves for the right-hand side of a discretization with the same unknowns.
+    ///
+    /// # Errors
+    /// When the system turns out to be singular in floating-point arithmetic.
+    pub fn solve(
+        &mut self,
+        discretization: &Discretization<'_>,
+        observer: &mut dyn Observer,
+    ) -> Result<Solution, Failure> {
+        observer.phase("solve");
+        let wanted = self.right_side(discretization);
+        let mut x = wanted.clone();
+        let mut residual = self.factorization.solve(&mut x, discretization.components)?;
+        if !(residual < BROKEN) && self.may_fall_back {
+            observer.phase("factorize");
+            self.may_fall_back = false;
+            self.factorizations += 1;
+            self.fallbacks += 1;
+            let Form::Mixed(numbering) = &self.form else {
+                return Err(broken(residual));
+            };
+            self.factorization = Factorization::lu(mixed_system::matrix(discretization, numbering))?;
+            observer.phase("solve");
+            x = wanted;
+            residual = self.factorization.solve(&mut x, discretization.components)?;
+        }
+        if !(residual < BROKEN) {
+            return Err(broken(residual));
+        }
+        let values = match &self.form {
+            Form::OneField => one_field::field(discretization, &x),
+            Form::Mixed(numbering) => numbering.field(discretization, &x, 0),
+        };
+        Ok(Solution { values, residual })
+    }
+
+    fn right_side(&self, discretization: &Discretization<'_>) -> Vec<f64> {
+        match &self.form {
+            Form::OneField => one_field::right_side(discretization),
+            Form::Mixed(numbering) => mixed_system::right_side(discretization, numbering),
+        }
+    }
+
+    /// `cholesky`, `lblt` or `lu`.
+    pub fn solver(&self) -> &'static str {
+        self.factorization.name()
+    }
+
+    pub fn unknowns(&self) -> usize {
+        self.factorization.dimension()
+    }
+
+    pub fn matrix_entries(&self) -> usize {
+        self.factorization.matrix_entries()
+    }
+
+    /// `None` where the factorization does not tell.
+    pub fn factor_entries(&self) -> Option<usize> {
+        self.factorization.factor_entries()
+    }
+}
+
+fn broken(residual: f64) -> Failure {
+    Failure {
+        kind: "singular".to_string(),
+        reason: format!(
+            "the system is singular or nearly so: its solution leaves the relative residual {residual:.1e}; with \
+             condition = \"curve\" use curve = \"stabilised\", and look for very thin triangles"
+        ),
+    }
+}
+
+/// The nullity of the mixed matrix, for up to 600 unknowns.
+pub fn mixed_nullity(discretization: &Discretization<'_>) -> Option<usize> {
+    let numbering = Numbering::new(discretization);
+    // The singular values of a large matrix take too long.
+    (numbering.count <= 600)
+        .then(|| nullity(&mixed_system::matrix(discretization, &numbering)))
+        .flatten()
+}

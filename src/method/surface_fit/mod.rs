@@ -1,0 +1,217 @@
+//! Surface fitting by Voronoi squared distance minimization: a mesh, or the control mesh of a Catmull-Clark surface, onto
+//! a target of triangles that need not hang together. Source: Nivoliers, Yan, Lévy 2012, Fitting polynomial surfaces to
+//! triangular meshes with Voronoi squared distance minimization.
+//!
+//! The stages: [`problem`] reads the model and scales it, [`sampling`] samples the target, [`objective`] is minimized by
+//! L-BFGS through a schedule of anisotropy and regularization, [`outcome`] measures the fit.
+//!
+//! Guaranteed: the energy of a stage never increases; the same input gives the same bits with any number of threads; a
+//! template of the wrong kind still ends with a verdict. Not guaranteed: that the fit reaches the target everywhere, for
+//! the connectivity of the template stays and minima are local.
+
+pub mod metrics;
+pub mod model;
+pub mod objective;
+pub mod outcome;
+pub mod problem;
+pub mod sampling;
+pub mod settings;
+pub mod trace;
+
+use super::model::ModelKind;
+use super::setting::Field;
+use super::{Failure, Inputs, Method, Outcome};
+use crate::mesh::catmull_clark::{limit, subdivide};
+use crate::mesh::linear_map::LinearMap;
+use crate::mesh::surface::Surface;
+use crate::metric::Metric;
+use crate::optimize::lbfgs::Lbfgs;
+use crate::optimize::{Counters, Objective, Observer, StopReason, Stopping};
+use objective::FitObjective;
+use problem::Problem;
+use serde_json::Value;
+use settings::Settings;
+use trace::{Recorder, Trace};
+
+/// The method `surface-fit`.
+pub struct SurfaceFit;
+
+impl Method for SurfaceFit {
+    fn name(&self) -> &'static str {
+        "surface-fit"
+    }
+
+    fn version(&self) -> u32 {
+        1
+    }
+
+    fn summary(&self) -> &'static str {
+        "fits a mesh or a Catmull-Clark control mesh to a triangle surface, minimizing Voronoi squared distances"
+    }
+
+    fn source(&self) -> &'static str {
+        "Fitting polynomial surfaces to triangular meshes with Voronoi squared distance minimization, Engineering with \
+         Computers, 2012"
+    }
+
+    fn model(&self) -> &'static ModelKind {
+        model::kind()
+    }
+
+    fn settings(&self) -> &'static [Field] {
+        settings::FIELDS
+    }
+
+    fn check(&self, settings: &Value) -> Vec<(String, String)> {
+        settings::check(settings)
+    }
+
+    fn canonical(&self, settings: Value) -> Value {
+        match Settings::resolve(&settings) {
+            Ok(resolved) => resolved.canonical(),
+            // Left as it is: running it will say what is wrong.
+            Err(_) => settings,
+        }
+    }
+
+    fn metrics(&self) -> &'static [Metric] {
+        metrics::all()
+    }
+
+    fn traces(&self) -> &'static [(&'static str, &'static str)] {
+        trace::COLUMNS
+    }
+
+    fn counters(&self) -> &'static [(&'static str, &'static str)] {
+        COUNTERS
+    }
+
+    fn run(&self, inputs: Inputs<'_>, observer: &mut dyn Observer) -> Result<Outcome, Failure> {
+        let settings = Settings::resolve(inputs.settings)?;
+        observer.phase("prepare");
+        let problem = Problem::new(&inputs.model)?;
+        run(&problem, &settings, observer)
+    }
+}
+
+/// Names and meanings of the counters.
+pub const COUNTERS: &[(&str, &str)] = &[
+    ("iterations", "accepted steps of all stages"),
+    (
+        "evaluations",
+        "evaluations of the energy with its gradient, of all stages",
+    ),
+    ("stages", "minimizations, one after the other"),
+];
+
+/// The fitted mesh of a control mesh and the map to its points.
+pub fn fitted_mesh(control: &Surface, creases: &[[u32; 2]], settings: &Settings) -> (Surface, LinearMap) {
+    let subdivided = subdivide(control, creases, settings.subdivisions);
+    let map = if settings.limit && settings.subdivisions > 0 {
+        limit(&subdivided.surface, &subdivided.creases).after(&subdivided.map)
+    } else {
+        subdivided.map
+    };
+    let mut fitted = subdivided.surface;
+    map.apply(&control.points, &mut fitted.points);
+    (fitted, map)
+}
+
+/// Fits the template of a problem to its target.
+pub fn run(problem: &Problem, settings: &Settings, observer: &mut dyn Observer) -> Result<Outcome, Failure> {
+    let mut notices = problem.notices.clone();
+    let mut control = problem.template.clone();
+    let mut creases = control.creases(settings.crease_angle);
+    let stages = settings.stages();
+    let mut trace = Trace::default();
+    let mut counters = Counters::default();
+    let mut minimizations = 0;
+    let (mut stop, mut reason) = (StopReason::Converged, String::new());
+
+    observer.phase("sample");
+    let (mut fitted, mut map) = fitted_mesh(&control, &creases, settings);
+    let mut samples = sampling::sample(&problem.target, fitted.points.len(), settings, observer)?;
+    let mut parts = objective::Parts::default();
+    'rounds: for round in 0..=settings.refinements {
+        if round > 0 {
+            observer.phase("refine");
+            let finer = subdivide(&control, &creases, 1);
+            (control, creases) = (finer.surface, finer.creases);
+            (fitted, map) = fitted_mesh(&control, &creases, settings);
+            samples = sampling::sample(&problem.target, fitted.points.len(), settings, observer)?;
+        }
+        observer.phase("minimize");
+        let first = if round == 0 { 0 } else { stages.len() - 1 };
+        let mut objective = FitObjective::new(&problem.target, &samples, &fitted, &map, settings, stages[first])?;
+        let mut x = control.points.as_flattened().to_vec();
+        for &stage in &stages[first..] {
+            objective.set_stage(stage);
+            let lbfgs = Lbfgs {
+                stopping: Stopping {
+                    gradient_norm: settings.gradient_tolerance,
+                    relative_decrement: 0.0,
+                    relative_change: stage.change_tolerance,
+                    iterations: settings.iteration_limit,
+                    ..Stopping::default()
+                },
+                memory: settings.memory,
+                ..Lbfgs::default()
+            };
+            let mut recorder = Recorder {
+                latest: objective.latest(),
+                stage: minimizations,
+                before: counters.iterations,
+                observer,
+                trace: &mut trace,
+            };
+            let solution = lbfgs.minimize(&mut objective, x, &mut recorder);
+            x = solution.x;
+            counters += solution.counters;
+            minimizations += 1;
+            (stop, reason) = (solution.stop, solution.reason);
+            if matches!(
+                stop,
+                StopReason::TimeLimit | StopReason::Cancelled | StopReason::NotFinite
+            ) {
+                break;
+            }
+        }
+        objective.value(&x);
+        parts = objective.latest().get();
+        let (points, _) = x.as_chunks();
+        control.points = points.to_vec();
+        map.apply(&control.points, &mut fitted.points);
+        if matches!(
+            stop,
+            StopReason::TimeLimit | StopReason::Cancelled | StopReason::NotFinite
+        ) {
+            break 'rounds;
+        }
+    }
+
+    observer.phase("measure");
+    let last = stages[stages.len() - 1];
+    let measured = outcome::measure(problem, settings, &samples, &fitted, parts, last)?;
+    notices.extend(measured.notices);
+    let mut metrics = measured.metrics;
+    metrics.insert("control_vertices".to_string(), control.points.len() as f64);
+    let stop = match serde_json::to_value(stop) {
+        Ok(Value::String(word)) => word,
+        _ => format!("{stop:?}").to_lowercase(),
+    };
+    Ok(Outcome {
+        stop,
+        reason,
+        metrics,
+        traces: trace.columns(),
+        counters: [
+            ("iterations", counters.iterations),
+            ("evaluations", counters.evaluations),
+            ("stages", minimizations),
+        ]
+        .map(|(name, value)| (name.to_string(), value))
+        .into(),
+        notices,
+        mesh: Some(measured.mesh),
+    })
+}

@@ -1,0 +1,272 @@
+//! What is minimized over the control points: both squared distance terms and the regularizer, with exact derivatives
+//! (equations 2 and 3 of the paper; `G(P) = F(M P)` of its algorithm 2).
+
+use super::sampling::Samples;
+use super::settings::{Gradient, Settings, Stage, Terms};
+use crate::geometry::point_tree::PointTree;
+use crate::geometry::restricted_voronoi::Compatibility;
+use crate::geometry::squared_distance::{Anisotropy, Derivative, Options, SquaredDistance, Wanted};
+use crate::mesh::linear_map::LinearMap;
+use crate::mesh::surface::Surface;
+use crate::mesh::{TriangleMesh, area_vector, cross, dot, length, subtract};
+use crate::method::Failure;
+use crate::optimize::Objective;
+use std::cell::Cell;
+use std::rc::Rc;
+
+/// The parts of the energy at one point.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Parts {
+    /// From the target to the fit's vertices.
+    pub from_target: f64,
+    /// From the fit to the target's samples.
+    pub to_target: f64,
+    /// `|L X|^2`, without its factor.
+    pub regularizer: f64,
+}
+
+/// See the module.
+pub struct FitObjective<'a> {
+    target: &'a TriangleMesh,
+    samples: &'a Samples,
+    sample_tree: PointTree,
+    site_tree: PointTree,
+    map: &'a LinearMap,
+    cells: Vec<[u32; 3]>,
+    edges: Vec<[u32; 2]>,
+    degrees: Vec<f64>,
+    to_target: SquaredDistance,
+    from_target: SquaredDistance,
+    terms: Terms,
+    derivative: Derivative,
+    compatibility: f64,
+    stage: Stage,
+    latest: Rc<Cell<Parts>>,
+    points: Vec<[f64; 3]>,
+    gradient: Vec<[f64; 3]>,
+    term: Vec<[f64; 3]>,
+    laplacian: Vec<[f64; 3]>,
+    normals: Vec<[f64; 3]>,
+    areas: Vec<[f64; 3]>,
+    turns: Vec<[f64; 3]>,
+    control: Vec<[f64; 3]>,
+}
+
+impl<'a> FitObjective<'a> {
+    /// Of a fitted mesh whose points are `map` of the control points.
+    ///
+    /// # Errors
+    /// Surfaces with an index out of range, which reading would have found.
+    pub fn new(
+        target: &'a TriangleMesh,
+        samples: &'a Samples,
+        fitted: &Surface,
+        map: &'a LinearMap,
+        settings: &Settings,
+        stage: Stage,
+    ) -> Result<FitObjective<'a>, Failure> {
+        let cells = fitted.cut();
+        let prepared = |role: &str, points: &[[f64; 3]], cells: &[[u32; 3]]| {
+            SquaredDistance::new(points, cells).map_err(|error| Failure {
+                kind: "invalid-input".to_string(),
+                reason: format!("{role}: {error}"),
+            })
+        };
+        let edges: Vec<[u32; 2]> = fitted.edges().into_iter().map(|edge| edge.ends).collect();
+        let count = fitted.points.len();
+        let mut degrees = vec![0.0; count];
+        for &end in edges.as_flattened() {
+            degrees[end as usize] += 1.0;
+        }
+        Ok(FitObjective {
+            to_target: prepared("template", &fitted.points, &cells)?,
+            from_target: prepared("target", &target.points, &target.cells)?,
+            target,
+            samples,
+            sample_tree: PointTree::new(&samples.points),
+            site_tree: PointTree::new(&fitted.points),
+            map,
+            cells,
+            edges,
+            degrees,
+            terms: settings.terms,
+            derivative: match settings.gradient {
+                Gradient::Complete => Derivative::Complete,
+                Gradient::Paper => Derivative::Paper,
+            },
+            compatibility: settings.compatibility,
+            stage,
+            latest: Rc::new(Cell::new(Parts::default())),
+            points: vec![[0.0; 3]; count],
+            gradient: vec![[0.0; 3]; count],
+            term: vec![[0.0; 3]; count],
+            laplacian: vec![[0.0; 3]; count],
+            normals: vec![[0.0; 3]; count],
+            areas: vec![[0.0; 3]; count],
+            turns: vec![[0.0; 3]; count],
+            control: vec![[0.0; 3]; map.columns()],
+        })
+    }
+
+    /// The parts of the latest evaluation.
+    pub fn latest(&self) -> Rc<Cell<Parts>> {
+        self.latest.clone()
+    }
+
+    pub fn set_stage(&mut self, stage: Stage) {
+        self.stage = stage;
+    }
+
+    /// Value at control points; the gradient by the fitted points is left in `self.gradient`.
+    fn evaluate(&mut self, control: &[f64], with_gradient: bool) -> f64 {
+        let (control, _) = control.as_chunks();
+        if !control.iter().flatten().all(|x| x.is_finite()) {
+            return f64::INFINITY;
+        }
+        self.map.apply(control, &mut self.points);
+        self.gradient.fill([0.0; 3]);
+        let mut parts = Parts::default();
+        let s = self.stage.anisotropy;
+        let compatible = self.compatibility > 0.0;
+        if self.terms.to_target() {
+            let options = Options {
+                anisotropy: Anisotropy::Sites(s, &self.samples.normals),
+                compatibility: compatible.then_some(Compatibility {
+                    weight: self.compatibility,
+                    normals: &self.samples.normals,
+                }),
+                derivative: Derivative::Complete,
+            };
+            let wanted = Wanted {
+                surface: with_gradient.then_some(&mut self.term),
+                ..Wanted::default()
+            };
+            parts.to_target = self
+                .to_target
+                .evaluate(&self.points, &self.sample_tree, &options, wanted);
+            if with_gradient {
+                add_to(&mut self.gradient, &self.term, 1.0);
+            }
+        }
+        if self.terms.from_target() {
+            self.site_tree.set(&self.points);
+            if compatible {
+                self.find_normals();
+            }
+            let options = Options {
+                anisotropy: Anisotropy::Facets(s),
+                compatibility: compatible.then_some(Compatibility {
+                    weight: self.compatibility,
+                    normals: &self.normals,
+                }),
+                derivative: self.derivative,
+            };
+            let wanted = Wanted {
+                sites: with_gradient.then_some(&mut self.term),
+                normals: (with_gradient && compatible).then_some(&mut self.turns),
+                ..Wanted::default()
+            };
+            parts.from_target = self
+                .from_target
+                .evaluate(&self.target.points, &self.site_tree, &options, wanted);
+            if with_gradient {
+                add_to(&mut self.gradient, &self.term, 1.0);
+                if compatible {
+                    self.turn_normals();
+                }
+            }
+        }
+        // |L X|^2 and its gradient 2 L L X; L is symmetric.
+        apply_laplacian(&self.edges, &self.degrees, &self.points, &mut self.laplacian);
+        parts.regularizer = self.laplacian.as_flattened().iter().map(|x| x * x).sum();
+        if with_gradient && self.stage.regularization > 0.0 {
+            apply_laplacian(&self.edges, &self.degrees, &self.laplacian, &mut self.term);
+            add_to(&mut self.gradient, &self.term, 2.0 * self.stage.regularization);
+        }
+        self.latest.set(parts);
+        let value = parts.to_target + parts.from_target + self.stage.regularization * parts.regularizer;
+        if value.is_finite() { value } else { f64::INFINITY }
+    }
+
+    /// Unit normals of the fitted points: the directions of the sums of the area vectors around them.
+    fn find_normals(&mut self) {
+        self.areas.fill([0.0; 3]);
+        for &cell in &self.cells {
+            let area = area_vector(cell.map(|vertex| self.points[vertex as usize]));
+            for vertex in cell {
+                for axis in 0..3 {
+                    self.areas[vertex as usize][axis] += area[axis];
+                }
+            }
+        }
+        for (normal, area) in self.normals.iter_mut().zip(&self.areas) {
+            let size = length(*area);
+            *normal = if size > 0.0 { area.map(|x| x / size) } else { [0.0; 3] };
+        }
+    }
+
+    /// Adds what the turning of the normals does: the gradient by the normals through their definition.
+    fn turn_normals(&mut self) {
+        for ((turn, normal), area) in self.turns.iter_mut().zip(&self.normals).zip(&self.areas) {
+            let size = length(*area);
+            let along = dot(*turn, *normal);
+            *turn = if size > 0.0 {
+                std::array::from_fn(|axis| (turn[axis] - along * normal[axis]) / size)
+            } else {
+                [0.0; 3]
+            };
+        }
+        for &cell in &self.cells {
+            let [a, b, c] = cell.map(|vertex| self.points[vertex as usize]);
+            let pull: [f64; 3] =
+                std::array::from_fn(|axis| cell.iter().map(|&vertex| self.turns[vertex as usize][axis]).sum());
+            // d ((b - a) x (c - a)) . g
+            let by_b = cross(subtract(c, a), pull);
+            let by_c = cross(pull, subtract(b, a));
+            for axis in 0..3 {
+                self.gradient[cell[1] as usize][axis] += by_b[axis];
+                self.gradient[cell[2] as usize][axis] += by_c[axis];
+                self.gradient[cell[0] as usize][axis] -= by_b[axis] + by_c[axis];
+            }
+        }
+    }
+}
+
+fn add_to(sum: &mut [[f64; 3]], term: &[[f64; 3]], factor: f64) {
+    for (sum, term) in sum.as_flattened_mut().iter_mut().zip(term.as_flattened()) {
+        *sum += factor * term;
+    }
+}
+
+/// `(D - A) x` with the degrees `D` and the adjacency `A` of a graph.
+fn apply_laplacian(edges: &[[u32; 2]], degrees: &[f64], x: &[[f64; 3]], result: &mut [[f64; 3]]) {
+    for ((result, x), degree) in result.iter_mut().zip(x).zip(degrees) {
+        *result = x.map(|x| degree * x);
+    }
+    for &[a, b] in edges {
+        let (a, b) = (a as usize, b as usize);
+        for axis in 0..3 {
+            result[a][axis] -= x[b][axis];
+            result[b][axis] -= x[a][axis];
+        }
+    }
+}
+
+impl Objective for FitObjective<'_> {
+    fn dimension(&self) -> usize {
+        3 * self.map.columns()
+    }
+
+    fn value(&mut self, x: &[f64]) -> f64 {
+        self.evaluate(x, false)
+    }
+
+    fn gradient(&mut self, x: &[f64], gradient: &mut [f64]) -> f64 {
+        let value = self.evaluate(x, true);
+        if value.is_finite() {
+            self.map.apply_transposed(&self.gradient, &mut self.control);
+            gradient.copy_from_slice(self.control.as_flattened());
+        }
+        value
+    }
+}

@@ -1,0 +1,271 @@
+//! What is reported of a fit: its metrics, and both surfaces side by side with fields to colour them by.
+
+use super::objective::Parts;
+use super::problem::Problem;
+use super::sampling::Samples;
+use super::settings::{Settings, Stage};
+use crate::geometry::closest_point::ClosestPoint;
+use crate::geometry::point_tree::PointTree;
+use crate::geometry::squared_distance::{Options, SquaredDistance, Wanted};
+use crate::mesh::format::{Cells, vtu};
+use crate::mesh::surface::Surface;
+use crate::mesh::{self, TriangleMesh, area_vector, length, subtract};
+use crate::method::Failure;
+use crate::metric::distance::{self, Distance, Hausdorff};
+use std::collections::BTreeMap;
+
+/// Surface farther than this share of the diagonal is spurious, or missed.
+const FAR: f64 = 0.02;
+/// A fit that is worse than this share of the diagonal is called poor.
+const POOR: f64 = 0.03;
+
+/// See the module.
+pub struct Measured {
+    pub metrics: BTreeMap<String, f64>,
+    pub mesh: Vec<u8>,
+    pub notices: Vec<String>,
+}
+
+/// Measures a fitted mesh in the solver's units.
+pub fn measure(
+    problem: &Problem,
+    settings: &Settings,
+    samples: &Samples,
+    fitted: &Surface,
+    parts: Parts,
+    stage: Stage,
+) -> Result<Measured, Failure> {
+    let failure = |message: String| Failure {
+        kind: "not-finite".to_string(),
+        reason: message,
+    };
+    let target = &problem.target;
+    let triangulated = fitted.triangulated();
+    let hausdorff = distance::hausdorff(&triangulated, target).map_err(failure)?;
+    let mut metrics = BTreeMap::new();
+    let mut set = |name: &str, value: f64| {
+        metrics.insert(name.to_string(), value);
+    };
+    let Hausdorff { forward, backward, .. } = &hausdorff;
+    set("hausdorff", hausdorff.percent(hausdorff.max()));
+    set("hausdorff_fit_to_target", hausdorff.percent(forward.max));
+    set("hausdorff_target_to_fit", hausdorff.percent(backward.max));
+    set("distance_mean", hausdorff.percent(forward.mean.max(backward.mean)));
+    set("distance_rms", hausdorff.percent(forward.rms.max(backward.rms)));
+    let far = |surface: &TriangleMesh, distance: &Distance| {
+        let areas = surface.areas();
+        let beyond: f64 = areas
+            .iter()
+            .zip(&distance.cells)
+            .filter(|&(_, &distance)| distance > FAR * hausdorff.diagonal)
+            .map(|(area, _)| area)
+            .sum();
+        100.0 * beyond / areas.iter().sum::<f64>()
+    };
+    set("spurious_area", far(&triangulated, forward));
+    set("missed_area", far(target, backward));
+    let (crease, crease_mean) = crease_distances(target, &triangulated, settings.feature_angle);
+    set("crease_distance", hausdorff.percent(crease));
+    set("crease_distance_mean", hausdorff.percent(crease_mean));
+
+    let jacobians = fitted.scaled_jacobians();
+    set(
+        "scaled_jacobian_min",
+        jacobians.iter().copied().fold(f64::INFINITY, f64::min),
+    );
+    set(
+        "scaled_jacobian_mean",
+        jacobians.iter().sum::<f64>() / jacobians.len() as f64,
+    );
+    set("target_to_fit", parts.from_target);
+    set("fit_to_target", parts.to_target);
+    set("regularizer", parts.regularizer);
+    set(
+        "energy",
+        parts.from_target + parts.to_target + stage.regularization * parts.regularizer,
+    );
+    let area = triangulated.area();
+    set(
+        "approximation_error",
+        isotropic(&triangulated, samples)? / area - forward.rms.powi(2),
+    );
+    set(
+        "sample_spacing",
+        (target.area() / samples.points.len() as f64).sqrt() / hausdorff.diagonal,
+    );
+    set("samples", samples.points.len() as f64);
+    set("vertices", fitted.points.len() as f64);
+    set("faces", fitted.faces() as f64);
+    set("target_triangles", target.cells.len() as f64);
+    let as_surface = Surface {
+        points: target.points.clone(),
+        triangles: target.cells.clone(),
+        quads: Vec::new(),
+    };
+    let (target_euler, closed) = euler(&as_surface);
+    let (template_euler, _) = euler(&problem.template);
+    set("target_euler", target_euler as f64);
+    set("template_euler", template_euler as f64);
+
+    let mut notices = Vec::new();
+    if closed && target_euler != template_euler {
+        notices.push(format!(
+            "the closed target has the Euler characteristic {target_euler}, the template {template_euler}: no template of \
+             this connectivity can match it everywhere"
+        ));
+    }
+    if hausdorff.max() > POOR * hausdorff.diagonal {
+        let (way, farther) = if forward.max >= backward.max {
+            ("a point of the fit is this far from the target", forward)
+        } else {
+            ("a point of the target is this far from the fit", backward)
+        };
+        let [x, y, z] = problem.to_given_units(&[farther.place])[0];
+        notices.push(format!(
+            "a poor fit: {way}: {:.2} % of the diagonal, at ({x:.4}, {y:.4}, {z:.4})",
+            hausdorff.percent(farther.max)
+        ));
+    }
+    Ok(Measured {
+        mesh: side_by_side(problem, fitted, &jacobians, &hausdorff),
+        metrics,
+        notices,
+    })
+}
+
+/// The isotropic term from a surface to the samples.
+fn isotropic(surface: &TriangleMesh, samples: &Samples) -> Result<f64, Failure> {
+    let mut term = SquaredDistance::new(&surface.points, &surface.cells).map_err(|error| Failure {
+        kind: "invalid-input".to_string(),
+        reason: format!("fit: {error}"),
+    })?;
+    let tree = PointTree::new(&samples.points);
+    Ok(term.evaluate(&surface.points, &tree, &Options::default(), Wanted::default()))
+}
+
+/// Largest and mean distance of the target's crease lines to the fit; not-a-number without creases.
+fn crease_distances(target: &TriangleMesh, fit: &TriangleMesh, angle: f64) -> (f64, f64) {
+    const PARTS: usize = 4;
+    // Soups have no connectivity: vertices in one place count as one.
+    let welded = welded(target);
+    let open: Vec<[u32; 2]> = welded.creases(angle);
+    let edges = welded.edges();
+    // Boundaries are edges of the data, not of the shape.
+    let inner = |ends: &[u32; 2]| {
+        edges
+            .binary_search_by_key(ends, |edge| edge.ends)
+            .is_ok_and(|edge| edges[edge].faces.len() == 2)
+    };
+    let creases: Vec<[u32; 2]> = open.into_iter().filter(inner).collect();
+    if creases.is_empty() {
+        return (f64::NAN, f64::NAN);
+    }
+    let mut points = Vec::with_capacity(creases.len() * PARTS);
+    let mut weights = Vec::with_capacity(creases.len() * PARTS);
+    for &ends in &creases {
+        let [a, b] = ends.map(|end| welded.points[end as usize]);
+        for part in 0..PARTS {
+            let t = (part as f64 + 0.5) / PARTS as f64;
+            points.push(std::array::from_fn(|axis| a[axis] + t * (b[axis] - a[axis])));
+            weights.push(length(subtract(b, a)));
+        }
+    }
+    let distances = distance::of_points(&points, &ClosestPoint::new(fit));
+    let total: f64 = weights.iter().sum();
+    let mean = distances.iter().zip(&weights).map(|(d, w)| d * w).sum::<f64>() / total;
+    (distances.into_iter().fold(0.0, f64::max), mean)
+}
+
+/// The surface with vertices of the same coordinates made one, and without flat triangles.
+fn welded(mesh: &TriangleMesh) -> Surface {
+    let key = |vertex: u32| mesh.points[vertex as usize].map(|x| (x + 0.0).to_bits());
+    let mut order: Vec<u32> = (0..mesh.points.len() as u32).collect();
+    order.sort_unstable_by_key(|&vertex| (key(vertex), vertex));
+    let mut first = vec![0u32; mesh.points.len()];
+    for same in order.chunk_by(|&a, &b| key(a) == key(b)) {
+        for &vertex in same {
+            first[vertex as usize] = same[0];
+        }
+    }
+    Surface {
+        points: mesh.points.clone(),
+        triangles: mesh
+            .cells
+            .iter()
+            .filter(|&&cell| length(area_vector(mesh.corners(cell))) > 0.0)
+            .map(|cell| cell.map(|vertex| first[vertex as usize]))
+            .collect(),
+        quads: Vec::new(),
+    }
+}
+
+/// Vertices less edges plus faces over the vertices in use, and whether every edge has two faces.
+fn euler(surface: &Surface) -> (i64, bool) {
+    let edges = surface.edges();
+    let closed = edges.iter().all(|edge| edge.faces.len() == 2);
+    let mut used = surface.clone();
+    used.drop_unused();
+    (
+        used.points.len() as i64 - edges.len() as i64 + surface.faces() as i64,
+        closed,
+    )
+}
+
+/// Both surfaces in one file: the fit where it is, the target moved aside along x.
+fn side_by_side(problem: &Problem, fitted: &Surface, jacobians: &[f64], hausdorff: &Hausdorff) -> Vec<u8> {
+    let target = &problem.target;
+    let mut points = problem.to_given_units(&fitted.points);
+    let first = points.len() as u32;
+    let width = match (mesh::bounding_box(&points), mesh::bounding_box(&target.points)) {
+        (Some([low, high]), Some([from, to])) => {
+            let shift = high[0] - problem.centre[0] - problem.diagonal * from[0];
+            let room = 0.1 * (high[0] - low[0]).max(problem.diagonal * (to[0] - from[0]));
+            shift + room
+        }
+        _ => problem.diagonal,
+    };
+    points.extend(problem.to_given_units(&target.points).into_iter().map(|mut point| {
+        point[0] += width;
+        point
+    }));
+    // Triangles come first in the file, of the fit and then of the target; then the fit's quadrilaterals.
+    let own = fitted.triangles.len();
+    let mut triangles = fitted.triangles.clone();
+    triangles.extend(target.cells.iter().map(|cell| cell.map(|vertex| first + vertex)));
+    let cut = &hausdorff.forward.cells;
+    let mut distance: Vec<f64> = cut[..own].to_vec();
+    distance.extend(&hausdorff.backward.cells);
+    distance.extend(
+        cut[own..]
+            .chunks(2)
+            .map(|halves| halves.iter().copied().fold(0.0, f64::max)),
+    );
+    for value in &mut distance {
+        *value = hausdorff.percent(*value);
+    }
+    let others = target.cells.len();
+    let column = |of_fit: &dyn Fn(usize) -> f64, of_target: f64| -> Vec<f64> {
+        let quads = own..own + fitted.quads.len();
+        (0..own)
+            .map(of_fit)
+            .chain(std::iter::repeat_n(of_target, others))
+            .chain(quads.map(of_fit))
+            .collect()
+    };
+    let quality = column(&|face| jacobians[face], 1.0);
+    let part = column(&|_| 0.0, 1.0);
+    vtu::write(
+        &points,
+        Cells {
+            triangles: &triangles,
+            quads: &fitted.quads,
+            ..Cells::default()
+        },
+        &[],
+        &[
+            ("distance", 1, &distance),
+            ("scaled_jacobian", 1, &quality),
+            ("target", 1, &part),
+        ],
+    )
+}

@@ -1,0 +1,149 @@
+//! The problem that a model poses: a target surface and a template in common units.
+//!
+//! The solver works in units in which the diagonal of the target's box is 1 and its centre the origin, so that weights do
+//! not depend on the units of the files.
+
+use crate::mesh::format;
+use crate::mesh::generate::shape::generate_shape;
+use crate::mesh::generate::template::generate_template;
+use crate::mesh::surface::Surface;
+use crate::mesh::{self, TriangleMesh};
+use crate::method::Failure;
+use crate::method::model::{LoadedModel, Part};
+
+/// See the module.
+#[derive(Clone, Debug)]
+pub struct Problem {
+    /// In the solver's units.
+    pub target: TriangleMesh,
+    /// In the solver's units.
+    pub template: Surface,
+    /// Centre and diagonal of the target's box in the units of its file.
+    pub centre: [f64; 3],
+    pub diagonal: f64,
+    pub notices: Vec<String>,
+}
+
+fn invalid(reason: String) -> Failure {
+    Failure {
+        kind: "invalid-input".to_string(),
+        reason,
+    }
+}
+
+impl Problem {
+    /// Reads or generates the model.
+    ///
+    /// # Errors
+    /// `invalid-input` for a surface that cannot be used.
+    pub fn new(model: &LoadedModel) -> Result<Problem, Failure> {
+        let part = |role: &str| {
+            model
+                .parts
+                .get(role)
+                .ok_or_else(|| invalid(format!("the model has no `{role}`; give it a file or a generator")))
+        };
+        let mut notices = Vec::new();
+        let target = match part("target")? {
+            Part::Generated { generator, parameters } => {
+                generate_shape(generator, parameters).map_err(|message| invalid(format!("target: {message}")))?
+            }
+            Part::File { name, bytes, .. } => read(name, bytes, "target", &mut notices)?.triangulated(),
+        };
+        let Some([low, high]) = mesh::bounding_box(&target.points) else {
+            return Err(invalid("target: there are no points".to_string()));
+        };
+        let template = match part("template")? {
+            Part::Generated { generator, parameters } => generate_template(generator, parameters, [low, high])
+                .map_err(|message| invalid(format!("template: {message}")))?,
+            Part::File {
+                name,
+                bytes,
+                parameters,
+            } => {
+                let mut template = read(name, bytes, "template", &mut notices)?;
+                if parameters.get("place").and_then(|place| place.as_str()) == Some("box") {
+                    stretch(&mut template, [low, high])?;
+                }
+                template
+            }
+        };
+        Problem::from_parts(target, template, notices)
+    }
+
+    /// The problem of a target and a template in the same units.
+    ///
+    /// # Errors
+    /// `invalid-input` when the target has no area, or the template no faces.
+    pub fn from_parts(
+        mut target: TriangleMesh,
+        mut template: Surface,
+        mut notices: Vec<String>,
+    ) -> Result<Problem, Failure> {
+        let diagonal = mesh::diagonal(&target.points);
+        let Some([low, high]) = mesh::bounding_box(&target.points) else {
+            return Err(invalid("target: there are no points".to_string()));
+        };
+        let area = target.area();
+        if !(area > 1e-14 * diagonal * diagonal && diagonal.is_finite()) {
+            return Err(invalid(format!(
+                "target: {} triangles have the area {area:e} in a box of diagonal {diagonal:e}; give a surface with area",
+                target.cells.len()
+            )));
+        }
+        if template.faces() == 0 {
+            return Err(invalid("template: there are no faces; give a surface".to_string()));
+        }
+        let flat = target.areas().iter().filter(|&&area| !(area > 0.0)).count();
+        if flat > 0 {
+            notices.push(format!(
+                "target: {flat} of {} triangles have no area; they take no part in the fit and count in the distances",
+                target.cells.len()
+            ));
+        }
+        let centre: [f64; 3] = std::array::from_fn(|axis| 0.5 * (low[axis] + high[axis]));
+        for point in target.points.iter_mut().chain(&mut template.points) {
+            *point = std::array::from_fn(|axis| (point[axis] - centre[axis]) / diagonal);
+        }
+        Ok(Problem {
+            target,
+            template,
+            centre,
+            diagonal,
+            notices,
+        })
+    }
+
+    /// Points in the units of the target's file.
+    pub fn to_given_units(&self, points: &[[f64; 3]]) -> Vec<[f64; 3]> {
+        points
+            .iter()
+            .map(|point| std::array::from_fn(|axis| self.centre[axis] + self.diagonal * point[axis]))
+            .collect()
+    }
+}
+
+fn read(name: &str, bytes: &[u8], role: &str, notices: &mut Vec<String>) -> Result<Surface, Failure> {
+    let content = format::read(name, bytes).map_err(|error| invalid(format!("{role}: {error}")))?;
+    notices.extend(content.notices.iter().map(|notice| format!("{role}: {notice}")));
+    Surface::from_content(&content).map_err(|message| invalid(format!("{role}: {name}: {message}")))
+}
+
+/// Stretches a template onto a box, axis by axis.
+fn stretch(template: &mut Surface, [low, high]: [[f64; 3]; 2]) -> Result<(), Failure> {
+    let Some([from, to]) = mesh::bounding_box(&template.points) else {
+        return Err(invalid("template: there are no points".to_string()));
+    };
+    for point in &mut template.points {
+        *point = std::array::from_fn(|axis| {
+            let extent = to[axis] - from[axis];
+            let share = if extent > 0.0 {
+                (point[axis] - from[axis]) / extent
+            } else {
+                0.5
+            };
+            low[axis] + share * (high[axis] - low[axis])
+        });
+    }
+    Ok(())
+}

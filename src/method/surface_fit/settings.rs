@@ -1,0 +1,368 @@
+//! The settings of a surface fit: their declaration as data, and the typed form that the computation reads.
+
+use crate::method::Failure;
+use crate::method::setting::{Default, Field, Kind};
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
+
+const NUMBERS: Kind = Kind::Number { min: 0.0, max: 1e12 };
+
+/// Everything that `[settings]` may hold.
+pub static FIELDS: &[Field] = &[
+    Field {
+        name: "preset",
+        kind: Kind::Choice(&[
+            (
+                "best",
+                "stages of growing anisotropy and falling regularization, vertices on the limit surface",
+            ),
+            (
+                "paper",
+                "one stage with anisotropy 50 and regularization 0.0002, vertices of the subdivided mesh",
+            ),
+        ]),
+        default: Default::Text("best"),
+        doc: "Chooses every setting that the file leaves open. A setting in the file wins over the preset.",
+    },
+    Field {
+        name: "terms",
+        kind: Kind::Choice(&[
+            ("symmetric", "both terms"),
+            (
+                "target-to-fit",
+                "from the target to the fit's vertices only; spurious parts stay",
+            ),
+            (
+                "fit-to-target",
+                "from the fit to the target's samples only; parts of the target may be missed",
+            ),
+        ]),
+        default: Default::Text("symmetric"),
+        doc: "The squared distance terms that are minimized (equation 3 of the paper).",
+    },
+    Field {
+        name: "anisotropy",
+        kind: Kind::OneOf(&[
+            Kind::Number { min: 1e-3, max: 1e6 },
+            Kind::List(&Kind::Number { min: 1e-3, max: 1e6 }),
+        ]),
+        default: Default::Absent,
+        doc: "Factor s along the target's normals (section 3.6 of the paper), or a list with one entry a stage; the last \
+              entry of a shorter list holds on. Preset best: [1, 50], paper: 50.",
+    },
+    Field {
+        name: "regularization",
+        kind: Kind::OneOf(&[NUMBERS, Kind::List(&NUMBERS)]),
+        default: Default::Absent,
+        doc: "Factor lambda of |L X|^2 with the graph Laplacian L of the fitted mesh X, the target scaled to diagonal 1; or a \
+              list with one entry a stage. Preset best: [0.0002, 0.0002], paper: 0.0002.",
+    },
+    Field {
+        name: "gradient",
+        kind: Kind::Choice(&[
+            ("complete", "the derivative of the value"),
+            (
+                "paper",
+                "equation 4 for the sites, which is exact without anisotropy only",
+            ),
+        ]),
+        default: Default::Text("complete"),
+        doc: "The gradient of the term from the target to the fit's vertices.",
+    },
+    Field {
+        name: "compatibility",
+        kind: Kind::Number { min: 0.0, max: 100.0 },
+        default: Default::Number(0.0),
+        doc: "Weight of 1 - n . N beside the squared distance, with the normals of both surfaces, in squared diagonals: tells \
+              the two sides of a thin sheet apart. Needs a target that is oriented.",
+    },
+    Field {
+        name: "subdivisions",
+        kind: Kind::Integer { min: 0, max: 5 },
+        default: Default::Integer(2),
+        doc: "Catmull-Clark levels between the control mesh and the fitted mesh; 0 fits the template itself.",
+    },
+    Field {
+        name: "limit",
+        kind: Kind::Boolean,
+        default: Default::Absent,
+        doc: "Whether the fitted mesh has its vertices on the limit surface of the subdivision. Without effect for 0 \
+              subdivisions. Preset best: true, paper: false.",
+    },
+    Field {
+        name: "crease_angle",
+        kind: Kind::Number { min: 0.0, max: 180.0 },
+        default: Default::Number(180.0),
+        doc: "Edges of the template with a larger angle between its faces' normals, in degrees, stay sharp under \
+              subdivision.",
+    },
+    Field {
+        name: "refinements",
+        kind: Kind::Integer { min: 0, max: 6 },
+        default: Default::Integer(0),
+        doc: "How often the control mesh is subdivided after a fit and fitted again with the last stage.",
+    },
+    Field {
+        name: "sampling",
+        kind: Kind::Choice(&[
+            (
+                "auto",
+                "facets where they are small and one to sixteen times as many as the fit's vertices, else tessellation",
+            ),
+            ("facets", "the centres of the target's triangles, with their normals"),
+            (
+                "tessellation",
+                "a centroidal Voronoi tessellation of the target with `samples` points",
+            ),
+        ]),
+        default: Default::Text("auto"),
+        doc: "The points of the target that the fit's distance is measured to.",
+    },
+    Field {
+        name: "samples",
+        kind: Kind::Integer {
+            min: 0,
+            max: 10_000_000,
+        },
+        default: Default::Integer(0),
+        doc: "Points of a tessellation; 0 for twice as many as the fitted mesh has vertices.",
+    },
+    Field {
+        name: "sampling_iterations",
+        kind: Kind::Integer { min: 0, max: 10_000 },
+        default: Default::Integer(30),
+        doc: "Iterations of the tessellation.",
+    },
+    Field {
+        name: "seed",
+        kind: Kind::Integer { min: 0, max: i64::MAX },
+        default: Default::Integer(1),
+        doc: "Start of the points from which a tessellation begins.",
+    },
+    Field {
+        name: "iteration_limit",
+        kind: Kind::Integer { min: 0, max: 1_000_000 },
+        default: Default::Integer(100),
+        doc: "Most iterations of a stage.",
+    },
+    Field {
+        name: "change_tolerance",
+        kind: Kind::OneOf(&[
+            Kind::Number { min: 0.0, max: 1.0 },
+            Kind::List(&Kind::Number { min: 0.0, max: 1.0 }),
+        ]),
+        default: Default::Absent,
+        doc: "A stage is done when one step lowers the energy by less than this share of it; or a list with one entry a \
+              stage. Preset best: [0.003, 0.0003], paper: 0.0001.",
+    },
+    Field {
+        name: "gradient_tolerance",
+        kind: Kind::Number { min: 0.0, max: 1e12 },
+        default: Default::Number(1e-9),
+        doc: "A stage is done when the Euclidean norm of the gradient is below this.",
+    },
+    Field {
+        name: "memory",
+        kind: Kind::Integer { min: 1, max: 1000 },
+        default: Default::Integer(10),
+        doc: "Steps that L-BFGS remembers.",
+    },
+    Field {
+        name: "feature_angle",
+        kind: Kind::Number { min: 1.0, max: 180.0 },
+        default: Default::Number(40.0),
+        doc: "Edges of the target with a larger angle between its normals, in degrees, are the crease lines that the \
+              crease metrics measure; changes no fit.",
+    },
+];
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Terms {
+    Symmetric,
+    TargetToFit,
+    FitToTarget,
+}
+
+impl Terms {
+    pub fn from_target(self) -> bool {
+        self != Terms::FitToTarget
+    }
+
+    pub fn to_target(self) -> bool {
+        self != Terms::TargetToFit
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Gradient {
+    Complete,
+    Paper,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Sampling {
+    Auto,
+    Facets,
+    Tessellation,
+}
+
+/// The settings with nothing left open.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Settings {
+    pub terms: Terms,
+    /// One entry a stage, as are `regularization` and `change_tolerance`.
+    pub anisotropy: Vec<f64>,
+    pub regularization: Vec<f64>,
+    pub gradient: Gradient,
+    pub compatibility: f64,
+    pub subdivisions: usize,
+    pub limit: bool,
+    pub crease_angle: f64,
+    pub refinements: usize,
+    pub sampling: Sampling,
+    pub samples: usize,
+    pub sampling_iterations: usize,
+    pub seed: u64,
+    pub iteration_limit: u64,
+    pub change_tolerance: Vec<f64>,
+    pub gradient_tolerance: f64,
+    pub memory: usize,
+    pub feature_angle: f64,
+}
+
+/// One minimization of a schedule.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stage {
+    pub anisotropy: f64,
+    pub regularization: f64,
+    pub change_tolerance: f64,
+}
+
+/// The settings that may have one entry a stage.
+const SCHEDULES: [&str; 3] = ["anisotropy", "regularization", "change_tolerance"];
+
+impl Settings {
+    /// Reads validated settings, full or canonical. Fields that are absent take the preset's or the declared value.
+    ///
+    /// # Errors
+    /// A value that the declaration does not allow, which validation would have found.
+    pub fn resolve(settings: &Value) -> Result<Settings, Failure> {
+        let mut table = Map::new();
+        for field in FIELDS {
+            let value = match (settings.get(field.name), &field.default) {
+                (Some(value), _) => Some(value.clone()),
+                (None, Default::Boolean(value)) => Some(Value::from(*value)),
+                (None, Default::Integer(value)) => Some(Value::from(*value)),
+                (None, Default::Number(value)) => Some(Value::from(*value)),
+                (None, Default::Text(value)) => Some(Value::from(*value)),
+                _ => None,
+            };
+            if let Some(value) = value {
+                table.insert(field.name.to_string(), value);
+            }
+        }
+        let paper = table.remove("preset").is_some_and(|preset| preset == "paper");
+        let mut preset = |name: &str, best: Value, paper_value: Value| {
+            table.entry(name).or_insert(if paper { paper_value } else { best });
+        };
+        preset("anisotropy", Value::from(vec![1.0, 50.0]), Value::from(vec![50.0]));
+        preset("regularization", Value::from(vec![2e-4, 2e-4]), Value::from(vec![2e-4]));
+        preset(
+            "change_tolerance",
+            Value::from(vec![3e-3, 3e-4]),
+            Value::from(vec![1e-4]),
+        );
+        preset("limit", Value::from(true), Value::from(false));
+        for name in SCHEDULES {
+            if let Some(value) = table.get_mut(name)
+                && value.is_number()
+            {
+                *value = Value::from(vec![value.clone()]);
+            }
+        }
+        let settings: Settings = serde_json::from_value(Value::Object(table)).map_err(|error| Failure {
+            kind: "invalid-input".to_string(),
+            reason: format!("settings of surface-fit: {error}"),
+        })?;
+        match empty_list(&settings) {
+            Some(name) => Err(Failure {
+                kind: "invalid-input".to_string(),
+                reason: format!("settings of surface-fit: {name} is an empty list; give one value a stage"),
+            }),
+            None => Ok(settings),
+        }
+    }
+
+    /// The minimizations, one after the other.
+    pub fn stages(&self) -> Vec<Stage> {
+        // Tolerances alone make no stages.
+        let count = self.anisotropy.len().max(self.regularization.len());
+        let entry = |list: &[f64], stage: usize| list.get(stage).or(list.last()).copied().unwrap_or(0.0);
+        // The last stage gets the last tolerance, however many there are.
+        let tolerance = |stage: usize| {
+            let last = self.change_tolerance.last().copied().unwrap_or(0.0);
+            if stage + 1 == count {
+                last
+            } else {
+                entry(&self.change_tolerance, stage)
+            }
+        };
+        (0..count)
+            .map(|stage| Stage {
+                anisotropy: entry(&self.anisotropy, stage),
+                regularization: entry(&self.regularization, stage),
+                change_tolerance: tolerance(stage),
+            })
+            .collect()
+    }
+
+    /// The settings as a table without those that cannot change the result.
+    pub fn canonical(&self) -> Value {
+        let Ok(Value::Object(mut table)) = serde_json::to_value(self) else {
+            return Value::Null;
+        };
+        // The same stages under the same names, however they were written.
+        let stages = self.stages();
+        let column = |value: fn(&Stage) -> f64| Value::from(stages.iter().map(value).collect::<Vec<f64>>());
+        table.insert("anisotropy".to_string(), column(|stage| stage.anisotropy));
+        table.insert("regularization".to_string(), column(|stage| stage.regularization));
+        table.insert("change_tolerance".to_string(), column(|stage| stage.change_tolerance));
+        if self.subdivisions == 0 {
+            table.insert("limit".to_string(), Value::from(false));
+            if self.refinements == 0 {
+                table.remove("crease_angle");
+            }
+        }
+        if self.sampling == Sampling::Facets {
+            for name in ["samples", "sampling_iterations", "seed"] {
+                table.remove(name);
+            }
+        }
+        Value::Object(table)
+    }
+}
+
+fn empty_list(settings: &Settings) -> Option<&'static str> {
+    let lists = [
+        &settings.anisotropy,
+        &settings.regularization,
+        &settings.change_tolerance,
+    ];
+    SCHEDULES
+        .into_iter()
+        .zip(lists)
+        .find(|(_, list)| list.is_empty())
+        .map(|(name, _)| name)
+}
+
+/// Checks that go across fields: path of the offending field and message.
+pub fn check(settings: &Value) -> Vec<(String, String)> {
+    SCHEDULES
+        .into_iter()
+        .filter(|name| settings.get(name).and_then(Value::as_array).is_some_and(Vec::is_empty))
+        .map(|name| (name.to_string(), "an empty list; give one value a stage".to_string()))
+        .collect()
+}

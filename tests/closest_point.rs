@@ -1,0 +1,247 @@
+//! Closest points agree with brute force on every processor, whatever the triangles; distances between surfaces with known
+//! values, to the bit with any number of threads.
+
+use vargeo::geometry::closest_point::{ClosestPoint, Nearest, foot};
+use vargeo::linalg::processor::Processor;
+use vargeo::mesh::TriangleMesh;
+use vargeo::mesh::generate::shape::generate_shape;
+use vargeo::metric::distance::{Sampling, hausdorff, one_sided};
+
+/// Numbers in [-1, 1) from a linear congruential generator.
+fn numbers(seed: u64) -> impl FnMut() -> f64 {
+    let mut state = seed;
+    move || {
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (state >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+    }
+}
+
+fn squared(a: [f64; 3], b: [f64; 3]) -> f64 {
+    (0..3).map(|axis| (a[axis] - b[axis]).powi(2)).sum()
+}
+
+/// Squared distance to a triangle by a search over its barycentric coordinates, refined by halving.
+fn searched(corners: [[f64; 3]; 3], point: [f64; 3]) -> f64 {
+    let at = |v: f64, w: f64| -> f64 {
+        let [a, b, c] = corners;
+        squared(
+            point,
+            std::array::from_fn(|axis| a[axis] + v * (b[axis] - a[axis]) + w * (c[axis] - a[axis])),
+        )
+    };
+    let (mut v, mut w, mut step) = (1.0 / 3.0, 1.0 / 3.0, 0.5);
+    while step > 1e-9 {
+        let mut best = (at(v, w), v, w);
+        for (dv, dw) in [
+            (1.0, 0.0),
+            (-1.0, 0.0),
+            (0.0, 1.0),
+            (0.0, -1.0),
+            (1.0, -1.0),
+            (-1.0, 1.0),
+        ] {
+            let (next_v, next_w) = ((v + step * dv).max(0.0), (w + step * dw).max(0.0));
+            let sum = (next_v + next_w).max(1.0);
+            let (next_v, next_w) = (next_v / sum, next_w / sum);
+            if at(next_v, next_w) < best.0 {
+                best = (at(next_v, next_w), next_v, next_w);
+            }
+        }
+        if (best.1, best.2) == (v, w) {
+            step /= 2.0;
+        }
+        (v, w) = (best.1, best.2);
+    }
+    at(v, w)
+}
+
+/// Random triangles of very different sizes, needles, segments, points and copies among them.
+fn soup() -> TriangleMesh {
+    let mut next = numbers(7);
+    let mut mesh = TriangleMesh::default();
+    for kind in 0..700 {
+        let size = 10f64.powf(2.0 * next() - 1.5);
+        let centre = [next(), next(), next()];
+        let mut corner = || -> [f64; 3] { std::array::from_fn(|axis| centre[axis] + size * next()) };
+        let [a, b, mut c] = [corner(), corner(), corner()];
+        match kind % 10 {
+            0 => c = b,
+            1 => c = std::array::from_fn(|axis| a[axis] + 0.4 * (b[axis] - a[axis])),
+            2 => c[0] = b[0] + 1e-13,
+            _ => {}
+        }
+        let first = mesh.points.len() as u32;
+        mesh.points.extend([a, b, if kind % 50 == 3 { a } else { c }]);
+        mesh.cells.push([first, first + 1, first + 2]);
+        if kind % 70 == 5 {
+            mesh.cells.push([first, first, first]);
+        }
+    }
+    mesh
+}
+
+#[test]
+fn nearest_triangle_as_by_brute_force() {
+    let mesh = soup();
+    let mut next = numbers(11);
+    let points: Vec<[f64; 3]> = (0..300)
+        .map(|index| {
+            let reach = if index % 7 == 0 { 100.0 } else { 1.2 };
+            std::array::from_fn(|_| reach * next())
+        })
+        .collect();
+    let expected: Vec<f64> = points
+        .iter()
+        .map(|&point| {
+            let each = mesh.cells.iter().map(|&cell| {
+                let foot = foot(mesh.corners(cell), point);
+                squared(point, foot)
+            });
+            each.fold(f64::INFINITY, f64::min)
+        })
+        .collect();
+    let mut bits: Option<Vec<u64>> = None;
+    for processor in Processor::available() {
+        let tree = ClosestPoint::new(&mesh).with_processor(processor);
+        let mut found = vec![
+            Nearest {
+                squared_distance: 0.0,
+                triangle: 0
+            };
+            points.len()
+        ];
+        tree.nearest_each(&points, Some(3), &mut found);
+        for ((nearest, expected), &point) in found.iter().zip(&expected).zip(&points) {
+            assert!(
+                (nearest.squared_distance - expected).abs() <= 1e-12 * expected + 1e-24,
+                "{nearest:?}, by brute force {expected}"
+            );
+            let named = squared(point, tree.foot(nearest.triangle, point));
+            assert!((named - expected).abs() <= 1e-12 * expected + 1e-24);
+            let alone = tree.nearest(point, None).squared_distance;
+            assert!((alone - expected).abs() <= 1e-12 * expected + 1e-24);
+        }
+        let these: Vec<u64> = found.iter().map(|nearest| nearest.squared_distance.to_bits()).collect();
+        assert_eq!(
+            bits.get_or_insert(these.clone()),
+            &these,
+            "the same bits on every processor"
+        );
+    }
+}
+
+#[test]
+fn foot_of_a_point_is_the_nearest_point_of_the_triangle() {
+    let mesh = soup();
+    let mut next = numbers(5);
+    for &cell in mesh.cells.iter().step_by(3) {
+        let point: [f64; 3] = std::array::from_fn(|_| next());
+        let corners = mesh.corners(cell);
+        let ours = squared(point, foot(corners, point));
+        let searched = searched(corners, point);
+        assert!(
+            (ours - searched).abs() < 1e-7 * searched.max(1e-3),
+            "{ours} against {searched}"
+        );
+    }
+}
+
+#[test]
+fn distances_between_surfaces_with_known_values() {
+    // A cube of edge 2 and one with its upper side raised by 0.1 in the middle: a pyramid.
+    let cube = generate_shape(
+        "cuboid",
+        &serde_json::json!({ "triangles": 48, "a": 1, "b": 1, "c": 1 }),
+    )
+    .unwrap();
+    let mut raised = cube.clone();
+    let top = raised
+        .points
+        .iter()
+        .position(|point| *point == [0.0, 0.0, 1.0])
+        .expect("the middle of the upper side is a vertex");
+    raised.points[top][2] = 1.1;
+    let found = hausdorff(&raised, &cube).unwrap();
+    let diagonal = 12f64.sqrt();
+    assert!((found.diagonal - diagonal).abs() < 1e-12);
+    assert!((found.forward.max - 0.1).abs() < 1e-12, "{}", found.forward.max);
+    assert_eq!(found.forward.place, [0.0, 0.0, 1.1]);
+    // Back: the upper side's middle to the slopes, which fall by 0.1 over 1 where the mesh is cut along its diagonals.
+    assert!(found.backward.max <= 0.1 && found.backward.max > 0.09);
+    assert!(found.backward.bound >= found.backward.max && found.backward.bound - found.backward.max <= 5e-4 * diagonal);
+    // The mean height of a pyramid is a third of its own; 24 is the cube's area.
+    let expected = 4.0 * 0.1 / 3.0 / found_area(&raised);
+    assert!(
+        (found.forward.mean / expected - 1.0).abs() < 0.01,
+        "{}",
+        found.forward.mean
+    );
+
+    // Concentric spheres: the distance is the same everywhere but for the facets.
+    let sphere = |radius: f64| {
+        let parameters = serde_json::json!({ "triangles": 3000, "a": radius, "b": radius, "c": radius });
+        generate_shape("ellipsoid", &parameters).unwrap()
+    };
+    let found = hausdorff(&sphere(1.0), &sphere(1.1)).unwrap();
+    for distance in [&found.forward, &found.backward] {
+        assert!((distance.mean - 0.1).abs() < 2e-3 && (distance.max - 0.1).abs() < 5e-3);
+        assert!(distance.rms >= distance.mean && distance.rms <= distance.max);
+    }
+}
+
+fn found_area(mesh: &TriangleMesh) -> f64 {
+    mesh.area()
+}
+
+#[test]
+fn maximum_between_samples_is_found_and_certain() {
+    // One large triangle over a fine cone: the largest distance is at the tip, which no coarse sample hits.
+    let mut cone = TriangleMesh::default();
+    let tip = [0.237, 0.411, 0.0];
+    for (x, y) in [(-2.0, -2.0), (3.0, -2.0), (-2.0, 3.0)] {
+        cone.points.push([x, y, 1.0]);
+    }
+    cone.points.push(tip);
+    cone.cells = vec![[0, 1, 3], [1, 2, 3], [2, 0, 3]];
+    let flat = TriangleMesh {
+        points: cone.points[..3].to_vec(),
+        cells: vec![[0, 1, 2]],
+    };
+    let sampling = Sampling {
+        spacing: 2.0,
+        tolerance: 1e-4,
+    };
+    let distance = one_sided(&flat, &ClosestPoint::new(&cone), sampling);
+    let finer = Sampling {
+        spacing: 0.004,
+        tolerance: 1e-5,
+    };
+    let reference = one_sided(&flat, &ClosestPoint::new(&cone), finer);
+    assert!(distance.max <= reference.bound && reference.max <= distance.bound);
+    assert!(
+        distance.bound - distance.max <= 1e-4 + 1e-12,
+        "{}",
+        distance.bound - distance.max
+    );
+    assert!((distance.max - reference.max).abs() < 2e-4);
+}
+
+#[test]
+fn same_bits_with_any_number_of_threads() {
+    let shape = |noise: f64| {
+        let parameters = serde_json::json!({ "triangles": 4000, "noise": noise, "seed": 4 });
+        generate_shape("flower", &parameters).unwrap()
+    };
+    let (first, second) = (shape(0.01), shape(0.0));
+    let run = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| hausdorff(&first, &second).unwrap())
+    };
+    let one = run(1);
+    assert!(one.max() > 0.0);
+    for threads in [2, 4] {
+        assert_eq!(run(threads), one);
+    }
+}

@@ -1,0 +1,361 @@
+//! The restricted Voronoi diagram against brute force, on random and on adversarial inputs.
+
+use vargeo::geometry::point_tree::PointTree;
+use vargeo::geometry::restricted_voronoi::{Compatibility, Error, Label, RestrictedVoronoi};
+
+type Point = [f64; 3];
+
+fn subtract(a: Point, b: Point) -> Point {
+    std::array::from_fn(|k| a[k] - b[k])
+}
+
+fn square(a: Point) -> f64 {
+    a.iter().map(|x| x * x).sum()
+}
+
+fn cross(a: Point, b: Point) -> Point {
+    std::array::from_fn(|k| a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3])
+}
+
+fn area(polygon: &[Point]) -> f64 {
+    let mut sum = [0.0; 3];
+    for k in 2..polygon.len() {
+        let part = cross(subtract(polygon[k - 1], polygon[0]), subtract(polygon[k], polygon[0]));
+        sum = std::array::from_fn(|axis| sum[axis] + part[axis]);
+    }
+    0.5 * square(sum).sqrt()
+}
+
+/// Deterministic numbers in (-1, 1).
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> f64 {
+        self.0 = self
+            .0
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+    }
+    fn points(&mut self, count: usize) -> Vec<Point> {
+        (0..count).map(|_| [self.next(), self.next(), self.next()]).collect()
+    }
+}
+
+/// Triangles that share no vertex.
+fn soup(corners: Vec<Point>) -> (Vec<Point>, Vec<[u32; 3]>) {
+    let cells = (0..corners.len() as u32 / 3)
+        .map(|k| [3 * k, 3 * k + 1, 3 * k + 2])
+        .collect();
+    (corners, cells)
+}
+
+/// A piece by definition: the triangle cut by the bisector with every other site in turn.
+fn brute_force(triangle: [Point; 3], sites: &[Point], i: usize) -> Vec<Point> {
+    let mut polygon = triangle.to_vec();
+    for (j, &other) in sites.iter().enumerate() {
+        if j == i {
+            continue;
+        }
+        let side = |x: Point| square(subtract(x, sites[i])) - square(subtract(x, other));
+        let old = std::mem::take(&mut polygon);
+        for k in 0..old.len() {
+            let (a, b) = (old[k], old[(k + 1) % old.len()]);
+            let (s, t) = (side(a), side(b));
+            if s <= 0.0 {
+                polygon.push(a);
+            }
+            if (s <= 0.0) != (t <= 0.0) {
+                polygon.push(std::array::from_fn(|axis| a[axis] + s / (s - t) * (b[axis] - a[axis])));
+            }
+        }
+    }
+    polygon
+}
+
+/// Checks what holds for every input: areas sum to the triangles', every piece's points are nearest to its site, edges lie
+/// where their labels say. Returns the number of pieces.
+fn check(name: &str, points: &[Point], cells: &[[u32; 3]], sites: &[Point]) -> usize {
+    let mut diagram = RestrictedVoronoi::new(points, cells).expect("a valid surface");
+    let mut areas = vec![0.0; cells.len()];
+    let mut owners = std::collections::BTreeSet::new();
+    let extent = points
+        .iter()
+        .chain(sites)
+        .map(|x| square(*x))
+        .fold(0.0, f64::max)
+        .max(1e-300);
+    let near = |x: Point| {
+        sites
+            .iter()
+            .map(|site| square(subtract(x, *site)))
+            .fold(f64::INFINITY, f64::min)
+    };
+    diagram.pieces(points, &PointTree::new(sites), None, |piece| {
+        let owner = sites[piece.site as usize];
+        assert!(
+            owners.insert((piece.triangle, piece.site)),
+            "{name}: site {} owns two pieces of triangle {}",
+            piece.site,
+            piece.triangle
+        );
+        areas[piece.triangle as usize] += piece.area;
+        let count = piece.polygon.len();
+        for k in 0..count {
+            let (from, to) = (piece.polygon[k], piece.polygon[(k + 1) % count]);
+            let middle: Point = std::array::from_fn(|axis| 0.5 * (from[axis] + to[axis]));
+            for x in [from, middle] {
+                let excess = square(subtract(x, owner)) - near(x);
+                assert!(
+                    excess <= 1e-12 * extent,
+                    "{name}: {excess:.1e} farther than the nearest site"
+                );
+            }
+            match piece.labels[k] {
+                Label::Site(other) => {
+                    let other = square(subtract(middle, sites[other as usize]));
+                    let off = (other - square(subtract(middle, owner))).abs();
+                    assert!(
+                        off <= 1e-11 * extent,
+                        "{name}: an edge is off its bisector by {off:.1e}"
+                    );
+                }
+                Label::Edge(k) => {
+                    let cell = cells[piece.triangle as usize].map(|v| points[v as usize]);
+                    let (a, b) = (cell[k as usize], cell[(k as usize + 1) % 3]);
+                    let off = area(&[a, b, middle]);
+                    assert!(
+                        off <= 1e-12 * extent,
+                        "{name}: an edge is off the triangle's by {off:.1e}"
+                    );
+                }
+            }
+        }
+    });
+    for (cell, sum) in cells.iter().zip(&areas) {
+        let corners = cell.map(|v| points[v as usize]);
+        let whole = area(&corners);
+        let longest = (0..3)
+            .map(|k| square(subtract(corners[k], corners[(k + 1) % 3])))
+            .fold(0.0, f64::max);
+        assert!(
+            (sum - whole).abs() <= 1e-9 * whole + 1e-13 * longest,
+            "{name}: pieces of area {sum:e} in a triangle of area {whole:e}"
+        );
+    }
+    owners.len()
+}
+
+#[test]
+fn brute_force_on_random_soups() {
+    let mut random = Random(1);
+    for (triangles, sites, size) in [
+        (40, 1, 1.0),
+        (30, 12, 1.0),
+        (30, 60, 0.5),
+        (200, 30, 0.05),
+        (4, 150, 2.0),
+    ] {
+        let mut corners = Vec::new();
+        for _ in 0..triangles {
+            let centre = random.points(1)[0];
+            for corner in random.points(3) {
+                corners.push(std::array::from_fn(|k| centre[k] + size * corner[k]));
+            }
+        }
+        let (points, cells) = soup(corners);
+        let sites = random.points(sites);
+        check("random", &points, &cells, &sites);
+        let mut found = std::collections::BTreeMap::new();
+        let mut diagram = RestrictedVoronoi::new(&points, &cells).expect("a valid surface");
+        diagram.pieces(&points, &PointTree::new(&sites), None, |piece| {
+            assert!((area(piece.polygon) - piece.area).abs() < 1e-12);
+            found.insert((piece.triangle as usize, piece.site as usize), piece.area);
+        });
+        for (triangle, cell) in cells.iter().enumerate() {
+            let corners = cell.map(|v| points[v as usize]);
+            for i in 0..sites.len() {
+                let expected = area(&brute_force(corners, &sites, i));
+                let area = found.get(&(triangle, i)).copied().unwrap_or(0.0);
+                assert!(
+                    (area - expected).abs() < 1e-12 * size * size,
+                    "triangle {triangle}, site {i}: area {area} and {expected}"
+                );
+            }
+        }
+    }
+}
+
+/// A grid of points with the given spacing, `n` by `n` and at most four layers.
+fn grid(n: usize, spacing: f64) -> Vec<Point> {
+    (0..n * n * n.min(4))
+        .map(|k| [k % n, k / n % n, k / (n * n)].map(|c| c as f64 * spacing))
+        .collect()
+}
+
+#[test]
+fn adversarial_inputs() {
+    let square_at = |z: f64| {
+        soup(vec![
+            [0.1, 0.2, z],
+            [2.7, 0.1, z],
+            [2.9, 2.8, z],
+            [0.1, 0.2, z],
+            [2.9, 2.8, z],
+            [0.3, 2.6, z],
+        ])
+    };
+    // In the middle between two layers of a grid every piece has two equally near sites; so it is at any height that
+    // rounding moves off the middle.
+    for spacing in [1.0, 0.1, 0.3] {
+        let sites = grid((3.0 / spacing) as usize + 1, spacing);
+        for height in [
+            0.5 * spacing,
+            0.5 * spacing * (1.0 + 1e-16),
+            0.5 * spacing * (1.0 + 1e-13),
+            spacing,
+        ] {
+            let (points, cells) = square_at(height);
+            check("between the layers of a grid", &points, &cells, &sites);
+        }
+    }
+    // Triangles along the cells' own faces and through their corners.
+    let (points, cells) = soup(vec![
+        [0.5, 0.5, 0.5],
+        [1.5, 0.5, 0.5],
+        [1.5, 1.5, 1.5],
+        [0.5, 0.0, 0.0],
+        [0.5, 2.0, 0.0],
+        [0.5, 2.0, 2.0],
+    ]);
+    check("on the faces of cells", &points, &cells, &grid(3, 1.0));
+    // Sites in one place, alone and among others, and as the vertices of the surface.
+    let (points, cells) = square_at(0.3);
+    let mut sites = grid(4, 1.0);
+    sites.extend(grid(4, 1.0));
+    let pieces = check("twins", &points, &cells, &sites);
+    assert_eq!(pieces, check("without twins", &points, &cells, &grid(4, 1.0)));
+    check("one place", &points, &cells, &[[1.0, 1.0, 1.0]; 20]);
+    check("vertices as sites", &points, &cells, &points);
+    // All sites as near to one point of the triangle.
+    let circle: Vec<Point> = (0..40)
+        .map(|k| (k as f64 / 40.0 * std::f64::consts::TAU).sin_cos())
+        .map(|(s, c)| [1.5 + c, 1.5 + s, 0.3])
+        .collect();
+    check("on a circle", &points, &cells, &circle);
+    let sphere: Vec<Point> = circle
+        .iter()
+        .map(|x| [x[0], 1.5, 0.3 + x[1] - 1.5])
+        .chain(circle.iter().copied())
+        .collect();
+    check("on a sphere", &points, &cells, &sphere);
+    // Bisectors parallel to the triangle.
+    let column: Vec<Point> = (0..30).map(|k| [1.0, 1.0, k as f64 * 0.1]).collect();
+    check("above each other", &points, &cells, &column);
+    // Many sites in one triangle, in a grid in its plane and at random, and far from it.
+    let mut random = Random(3);
+    let plane: Vec<Point> = (0..1600)
+        .map(|k| [(k % 40) as f64 * 0.07, (k / 40) as f64 * 0.07, 0.3])
+        .collect();
+    check("grid in the plane", &points, &cells, &plane);
+    let cloud: Vec<Point> = random
+        .points(1500)
+        .iter()
+        .map(|x| [1.5 + x[0], 1.5 + x[1], 0.3 + 0.01 * x[2]])
+        .collect();
+    check("cloud in the plane", &points, &cells, &cloud);
+    for distance in [10.0, 1e3] {
+        let far: Vec<Point> = random
+            .points(300)
+            .iter()
+            .map(|x| [1.5 + x[0], 1.5 + x[1], distance])
+            .collect();
+        assert!(check("far away", &points, &cells, &far) > 1);
+        let far: Vec<Point> = (0..100)
+            .map(|k| [(k % 10) as f64 * 0.3, (k / 10) as f64 * 0.3, distance])
+            .collect();
+        assert!(check("grid far away", &points, &cells, &far) > 100);
+    }
+    // Needles, caps and triangles without area.
+    let (points, cells) = soup(vec![
+        [0.0, 0.0, 0.1],
+        [3.0, 0.0, 0.1],
+        [3.0, 1e-9, 0.1],
+        [0.0, 0.0, 0.2],
+        [3.0, 0.0, 0.2],
+        [1.5, 1e-12, 0.2],
+        [0.0, 1.0, 0.1],
+        [3.0, 1.0, 0.1],
+        [1.0, 1.0, 0.1],
+        [1.0, 1.0, 1.0],
+        [1.0, 1.0, 1.0],
+        [1.0, 1.0, 1.0],
+        [0.0, 0.0, 0.0],
+        [1e-9, 0.0, 0.0],
+        [0.0, 1e-9, 0.0],
+    ]);
+    check("thin triangles", &points, &cells, &grid(4, 1.0));
+    check("thin triangles", &points, &cells, &grid(21, 0.15));
+    // Large and small units.
+    let (points, sites) = (random.points(6), random.points(30));
+    let (points, cells) = soup(points);
+    let pieces = check("unit", &points, &cells, &sites);
+    for unit in [1e-40, 1e-8, 1e8, 1e40] {
+        let scale = |x: &[Point]| -> Vec<Point> { x.iter().map(|x| x.map(|x| x * unit)).collect() };
+        assert_eq!(check("unit", &scale(&points), &cells, &scale(&sites)), pieces);
+    }
+}
+
+/// Two sheets with opposite normals in one place are told apart by the compatibility, and the plain diagram when it weighs
+/// nothing.
+#[test]
+fn normal_compatibility() {
+    let (points, cells) = soup(vec![
+        [0.0, 0.0, 0.0],
+        [1.0, 0.0, 0.0],
+        [0.0, 1.0, 0.0],
+        [0.0, 0.0, 0.0],
+        [0.0, 1.0, 0.0],
+        [1.0, 0.0, 0.0],
+    ]);
+    let sites = vec![[0.2, 0.2, 0.0], [0.2, 0.2, 0.0], [0.6, 0.2, 0.0], [0.6, 0.2, 0.0]];
+    let normals = [[0.0, 0.0, -1.0], [0.0, 0.0, 1.0], [0.0, 0.0, 1.0], [0.0, 0.0, -1.0]];
+    let mut diagram = RestrictedVoronoi::new(&points, &cells).expect("a valid surface");
+    let mut owners = |weight: f64| {
+        let mut owners = Vec::new();
+        let compatibility = Some(Compatibility {
+            weight,
+            normals: &normals,
+        });
+        diagram.pieces(&points, &PointTree::new(&sites), compatibility, |piece| {
+            owners.push((piece.triangle, piece.site));
+        });
+        owners.sort_unstable();
+        owners
+    };
+    assert_eq!(owners(0.1), [(0, 1), (0, 2), (1, 0), (1, 3)]);
+    assert_eq!(owners(0.0), [(0, 0), (0, 2), (1, 0), (1, 2)]);
+}
+
+#[test]
+fn impossible_inputs() {
+    assert_eq!(
+        RestrictedVoronoi::new(&[[0.0; 3]; 2], &[[0, 1, 2]]).err(),
+        Some(Error::NoVertex {
+            triangle: 0,
+            vertex: 2,
+            vertices: 2
+        })
+    );
+    let (points, cells) = soup(vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]);
+    let mut diagram = RestrictedVoronoi::new(&points, &cells).expect("a valid surface");
+    for sites in [
+        vec![],
+        vec![[0.0, f64::NAN, 0.0]],
+        vec![[0.0; 3], [f64::INFINITY, 0.0, 0.0]],
+    ] {
+        diagram.pieces(&points, &PointTree::new(&sites), None, |_| {
+            panic!("no piece without proper sites")
+        });
+    }
+}

@@ -1,0 +1,203 @@
+//! Surface fits: exact gradients, a fit of known quality, damaged targets, and the same bits with any number of threads.
+
+use serde_json::{Value, json};
+use vargeo::mesh::generate::shape::{generate_shape, shapes};
+use vargeo::mesh::generate::template::{generate_template, templates};
+use vargeo::mesh::surface::Surface;
+use vargeo::method::model::{LoadedModel, Part};
+use vargeo::method::surface_fit::objective::FitObjective;
+use vargeo::method::surface_fit::settings::Settings;
+use vargeo::method::surface_fit::{SurfaceFit, fitted_mesh, sampling};
+use vargeo::method::{Inputs, Method, Outcome};
+use vargeo::optimize::{Objective, Silent};
+
+fn generated(generator: &str, parameters: Value) -> Part {
+    Part::Generated {
+        generator: generator.to_string(),
+        parameters,
+    }
+}
+
+fn fit(target: Part, template: Part, settings: Value) -> Result<Outcome, String> {
+    let model = LoadedModel {
+        parts: [("target".to_string(), target), ("template".to_string(), template)].into(),
+    };
+    let inputs = Inputs {
+        settings: &settings,
+        model,
+    };
+    SurfaceFit
+        .run(inputs, &mut Silent)
+        .map_err(|failure| format!("{}: {}", failure.kind, failure.reason))
+}
+
+#[test]
+fn gradient_is_that_of_the_value() {
+    let target = generate_shape("flower", &json!({ "triangles": 300, "petals": 3 })).unwrap();
+    let mut control = generate_template("box", &json!({ "quads": 24 }), [[-0.9; 3], [0.95; 3]]).unwrap();
+    for (index, x) in control.points.as_flattened_mut().iter_mut().enumerate() {
+        *x += 0.05 * (index as f64 * 12.9898).sin();
+    }
+    for compatibility in [0.0, 0.05] {
+        for s in [1.0, 5.0] {
+            let settings = Settings::resolve(&json!({
+                "subdivisions": 1, "anisotropy": s, "regularization": 0.01, "compatibility": compatibility
+            }))
+            .unwrap();
+            let (fitted, map) = fitted_mesh(&control, &[], &settings);
+            let samples = sampling::sample(&target, fitted.points.len(), &settings, &mut Silent).unwrap();
+            let stage = settings.stages()[0];
+            let mut objective = FitObjective::new(&target, &samples, &fitted, &map, &settings, stage).unwrap();
+            let x = control.points.as_flattened().to_vec();
+            let mut gradient = vec![0.0; x.len()];
+            objective.gradient(&x, &mut gradient);
+            let direction: Vec<f64> = (0..x.len()).map(|index| (index as f64 * 78.233).cos()).collect();
+            let slope: f64 = gradient.iter().zip(&direction).map(|(g, d)| g * d).sum();
+            let step = 1e-6;
+            let mut at = |t: f64| {
+                let moved: Vec<f64> = x.iter().zip(&direction).map(|(x, d)| x + t * d).collect();
+                objective.value(&moved)
+            };
+            let difference = (at(step) - at(-step)) / (2.0 * step);
+            assert!(
+                (slope / difference - 1.0).abs() < 1e-5,
+                "s = {s}, compatibility {compatibility}: {slope} against {difference}"
+            );
+        }
+    }
+}
+
+#[test]
+fn box_becomes_an_ellipsoid() {
+    let outcome = fit(
+        generated("ellipsoid", json!({ "triangles": 3000 })),
+        generated("box", json!({ "quads": 54 })),
+        json!({ "subdivisions": 1, "iteration_limit": 60 }),
+    )
+    .unwrap();
+    let metric = |name: &str| outcome.metrics[name];
+    assert!(metric("hausdorff") < 1.0, "{}", metric("hausdorff"));
+    assert!(metric("spurious_area") == 0.0 && metric("missed_area") == 0.0);
+    assert!(metric("scaled_jacobian_min") > 0.3, "{}", metric("scaled_jacobian_min"));
+    // Every metric, counter and column is there, and the energy falls within each stage.
+    for metric in SurfaceFit.metrics() {
+        assert!(outcome.metrics.contains_key(metric.name), "{} is missing", metric.name);
+    }
+    let (stage, energy) = (&outcome.traces["stage"], &outcome.traces["energy"]);
+    for row in 1..energy.len() {
+        assert!(stage[row] != stage[row - 1] || energy[row] <= energy[row - 1]);
+    }
+}
+
+#[test]
+fn damaged_targets_end_with_a_fit_and_wrong_templates_with_a_verdict() {
+    let damage = json!({
+        "triangles": 1500, "soup": 1, "flipped": 0.4, "degenerate": 40, "fins": 5, "holes": 2, "noise": 0.002, "seed": 2
+    });
+    let settings = json!({ "subdivisions": 1, "iteration_limit": 30 });
+    let outcome = fit(
+        generated("ellipsoid", damage),
+        generated("box", json!({ "quads": 54 })),
+        settings.clone(),
+    )
+    .unwrap();
+    assert!(
+        outcome.metrics["distance_rms"] < 1.0,
+        "{}",
+        outcome.metrics["distance_rms"]
+    );
+    let outcome = fit(
+        generated("torus", json!({ "triangles": 1500 })),
+        generated("box", json!({ "quads": 54 })),
+        settings,
+    )
+    .unwrap();
+    assert!(outcome.metrics["target_euler"] == 0.0 && outcome.metrics["template_euler"] == 2.0);
+    assert!(
+        outcome.notices.iter().any(|notice| notice.contains("Euler")),
+        "{:?}",
+        outcome.notices
+    );
+}
+
+#[test]
+fn bad_models_are_refused_with_the_reason() {
+    let template = || generated("box", json!({}));
+    let file = |text: &str| Part::File {
+        name: "bad.obj".to_string(),
+        bytes: text.as_bytes().to_vec(),
+        parameters: json!({}),
+    };
+    for (text, expected) in [
+        ("v 0 0 0\nv 1 0 0\nv 0 1 0\n", "no triangles"),
+        ("v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n", "area"),
+        ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", "bad.obj"),
+    ] {
+        let error = fit(file(text), template(), json!({})).unwrap_err();
+        assert!(error.contains(expected), "{error}");
+    }
+}
+
+#[test]
+fn same_bits_with_any_number_of_threads() {
+    let run = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| {
+            fit(
+                generated("sharp-sphere", json!({ "triangles": 1500 })),
+                generated("box", json!({ "quads": 24 })),
+                json!({ "subdivisions": 1, "iteration_limit": 12, "sampling": "tessellation", "sampling_iterations": 5 }),
+            )
+            .unwrap()
+        })
+    };
+    let one = run(1);
+    for threads in [2, 4] {
+        let other = run(threads);
+        assert_eq!(format!("{:?}", other.metrics), format!("{:?}", one.metrics));
+        assert_eq!(other.mesh, one.mesh);
+    }
+}
+
+#[test]
+fn clean_shapes_and_templates_are_closed_and_oriented() {
+    let known = [
+        ("ellipsoid", 2),
+        ("torus", 0),
+        ("knot", 0),
+        ("cuboid", 2),
+        ("sharp-sphere", 2),
+        ("flower", 2),
+        ("double-torus", -2),
+        ("bowl", 2),
+    ];
+    assert_eq!(shapes().len(), known.len());
+    for (name, euler) in known {
+        let mesh = generate_shape(name, &json!({ "triangles": 2000 })).unwrap();
+        assert!(mesh.enclosed_volume() > 0.0, "{name} is oriented outward");
+        let count = mesh.cells.len() as f64;
+        assert!((1200.0..2800.0).contains(&count), "{name} has {count} triangles");
+        let surface = Surface {
+            points: mesh.points,
+            triangles: mesh.cells,
+            quads: Vec::new(),
+        };
+        closed(name, &surface, euler);
+    }
+    for template in templates() {
+        let surface = generate_template(template.name, &json!({ "quads": 200 }), [[0.0; 3], [2.0, 1.0, 1.5]]).unwrap();
+        closed(template.name, &surface, if template.name == "torus" { 0 } else { 2 });
+        assert!(
+            surface.triangulated().enclosed_volume() > 0.0,
+            "{} is oriented outward",
+            template.name
+        );
+    }
+}
+
+fn closed(name: &str, surface: &Surface, euler: i64) {
+    let edges = surface.edges();
+    assert!(edges.iter().all(|edge| edge.faces.len() == 2), "{name} is closed");
+    let found = surface.points.len() as i64 - edges.len() as i64 + surface.faces() as i64;
+    assert_eq!(found, euler, "{name}");
+}

@@ -363,7 +363,10 @@ fn gradients_of_the_energy_have_second_order_remainders() {
         for name in ["hencky", "symmetric-dirichlet"] {
             let space = Space::new(&mesh, &topology, *basis, &[3, 2, 4, 3]).unwrap();
             let references = references_of_volume(mesh.iter().map(|cell| cell.0), mesh.volume());
-            let batches = Batches::new(&space, &references, &|kind| Rule::Gauss.cell(kind.shape, kind.order + 2)).unwrap();
+            let batches = Batches::new(&space, &references, &|kind| {
+                Rule::Gauss.cell(kind.shape, kind.order + 2)
+            })
+            .unwrap();
             let energy = VolumeEnergy::new(batches, Density::new(energy::find(name).unwrap())).unwrap();
             let mut x = space.linear(&mesh.points);
             for value in &mut x[3 * space.vertices..] {

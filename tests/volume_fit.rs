@@ -58,10 +58,20 @@ fn a_fit_is_valid_falls_in_every_stage_and_is_the_same_with_any_number_of_thread
     assert!(metric("certified_determinant") > 0.0);
     assert!(metric("certified_determinant") <= metric("min_determinant"));
     assert!(metric("hausdorff") < 6.0, "{}", metric("hausdorff"));
-    assert!(metric("scaled_jacobian_mean") > 0.85, "{}", metric("scaled_jacobian_mean"));
+    assert!(
+        metric("scaled_jacobian_mean") > 0.85,
+        "{}",
+        metric("scaled_jacobian_mean")
+    );
     let other = run(2);
     assert_eq!(outcome.mesh, other.mesh);
-    let bits = |outcome: &Outcome| outcome.metrics.values().map(|value| value.to_bits()).collect::<Vec<_>>();
+    let bits = |outcome: &Outcome| {
+        outcome
+            .metrics
+            .values()
+            .map(|value| value.to_bits())
+            .collect::<Vec<_>>()
+    };
     assert_eq!(bits(&outcome), bits(&other));
 }
 
@@ -87,7 +97,11 @@ fn bad_input_is_named() {
     );
     assert!(reason(empty).contains("removes all 1 cells"));
     let falling = json!({ "schedule": [{ "lambda": 1.0, "order": 3 }, { "lambda": 1.0, "order": 2 }] });
-    let falling = fit(json!({ "generate": "grid" }), Some(json!({ "shape": "block" })), falling);
+    let falling = fit(
+        json!({ "generate": "grid" }),
+        Some(json!({ "shape": "block" })),
+        falling,
+    );
     assert!(reason(falling).contains("orders only rise"));
     let voxels = fit(json!({ "generate": "voxels" }), None, json!({}));
     assert!(reason(voxels).contains("need a target surface"));
@@ -155,7 +169,11 @@ fn the_sampled_boundary_is_closed_and_follows_the_nodes() {
     }
     let topology = mesh.topology().unwrap();
     for basis in basis::bases() {
-        let orders = if mesh.hexahedra.is_empty() { vec![3; mesh.cells()] } else { vec![4, 3] };
+        let orders = if mesh.hexahedra.is_empty() {
+            vec![3; mesh.cells()]
+        } else {
+            vec![4, 3]
+        };
         let space = Space::new(&mesh, &topology, *basis, &orders).unwrap();
         let boundary = Boundary::new(&mesh, &topology, &space, 5);
         let mut x = space.linear(&mesh.points);
@@ -171,21 +189,32 @@ fn the_sampled_boundary_is_closed_and_follows_the_nodes() {
                 *sides.entry((cell[place], cell[(place + 1) % 3])).or_insert(0) += 1;
             }
         }
-        assert!(sides.iter().all(|(&(a, b), &count)| count == 1 && sides.contains_key(&(b, a))));
+        assert!(
+            sides
+                .iter()
+                .all(|(&(a, b), &count)| count == 1 && sides.contains_key(&(b, a)))
+        );
         let surface = TriangleMesh {
             points: samples.clone(),
             cells: boundary.triangles.clone(),
         };
         assert!(surface.enclosed_volume() > 0.0);
         // The pull-back is the transpose of the evaluation.
-        let forces: Vec<[f64; 3]> = (0..samples.len()).map(|k| [(k as f64).cos(), 1.0, (k as f64).sin()]).collect();
+        let forces: Vec<[f64; 3]> = (0..samples.len())
+            .map(|k| [(k as f64).cos(), 1.0, (k as f64).sin()])
+            .collect();
         let mut gradient = vec![0.0; x.len()];
         boundary.add_gradient(&forces, &mut gradient);
         let direction: Vec<f64> = (0..x.len()).map(|k| (0.3 * k as f64).sin()).collect();
         let mut moved = Vec::new();
         boundary.positions(&direction, &mut moved);
         let left: f64 = gradient.iter().zip(&direction).map(|(a, b)| a * b).sum();
-        let right: f64 = forces.as_flattened().iter().zip(moved.as_flattened()).map(|(a, b)| a * b).sum();
+        let right: f64 = forces
+            .as_flattened()
+            .iter()
+            .zip(moved.as_flattened())
+            .map(|(a, b)| a * b)
+            .sum();
         assert!((left - right).abs() < 1e-10 * left.abs().max(1.0), "{left} {right}");
         // Raising orders moves nothing.
         let up = Space::new(&mesh, &topology, *basis, &vec![6; mesh.cells()]).unwrap();
@@ -209,7 +238,11 @@ fn certificates_agree_with_stored_verdicts() {
         };
         mesh.push(Shape::Hexahedron, &[0, 1, 2, 3, 4, 5, 6, 7]);
         let topology = mesh.topology().unwrap();
-        let name = if record["family"] == "fourier" { "integrated-fourier" } else { "integrated-legendre" };
+        let name = if record["family"] == "fourier" {
+            "integrated-fourier"
+        } else {
+            "integrated-legendre"
+        };
         let basis = basis::find(name).unwrap();
         let order = 4;
         let space = Space::new(&mesh, &topology, basis, &[order]).unwrap();
@@ -264,11 +297,18 @@ fn certificates_of_prisms_and_tetrahedra_hold_and_find_failures() {
                 *value = size * (1.3 * place as f64).sin();
             }
             let verdict = certifier.judge(&space, 0, &unit_reference(shape), &x);
-            assert_eq!(matches!(verdict, Verdict::Positive(_)), positive, "{shape:?} {size}: {verdict:?}");
+            assert_eq!(
+                matches!(verdict, Verdict::Positive(_)),
+                positive,
+                "{shape:?} {size}: {verdict:?}"
+            );
             assert_eq!(matches!(verdict, Verdict::Negative(..)), !positive);
             if size == 0.0 {
-                let Verdict::Positive(bound) = verdict else { unreachable!() };
-                let exact = shape.canonical_volume() / vargeo::fem::batches::reference_volume(shape, &unit_reference(shape));
+                let Verdict::Positive(bound) = verdict else {
+                    unreachable!()
+                };
+                let exact =
+                    shape.canonical_volume() / vargeo::fem::batches::reference_volume(shape, &unit_reference(shape));
                 assert!((bound - exact).abs() < 1e-9, "{bound} {exact}");
             }
         }

@@ -90,10 +90,16 @@ impl Certifier {
                 }
                 Shape::Prism => {
                     result.lines.entry(degree).or_insert_with(|| line_conversion(degree));
-                    result.triangles.entry(kind.order).or_insert_with(|| triangle_conversion(kind.order));
+                    result
+                        .triangles
+                        .entry(kind.order)
+                        .or_insert_with(|| triangle_conversion(kind.order));
                 }
                 Shape::Tetrahedron => {
-                    result.tetrahedra.entry(kind.order).or_insert_with(|| tetrahedron_conversion(kind.order));
+                    result
+                        .tetrahedra
+                        .entry(kind.order)
+                        .or_insert_with(|| tetrahedron_conversion(kind.order));
                 }
             }
             if kind.shape == Shape::Hexahedron {
@@ -116,7 +122,11 @@ impl Certifier {
 
     /// Degree of the polynomials that stand for the line functions.
     fn degree(&self, order: usize) -> usize {
-        if self.polynomial(order) { order } else { (order + 3).max(6) }
+        if self.polynomial(order) {
+            order
+        } else {
+            (order + 3).max(6)
+        }
     }
 
     /// Judges a cell of a space.
@@ -208,11 +218,15 @@ impl Certifier {
                     slope_error,
                 ),
             ] {
-                let sampled: Vec<f64> = (0..=degree).map(|point| entries[point * table.functions + function]).collect();
+                let sampled: Vec<f64> = (0..=degree)
+                    .map(|point| entries[point * table.functions + function])
+                    .collect();
                 let size = sampled.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
                 let mut largest = 0.0_f64;
                 for row in 0..=degree {
-                    let value: f64 = (0..=degree).map(|column| convert[(row, column)] * sampled[column]).sum();
+                    let value: f64 = (0..=degree)
+                        .map(|column| convert[(row, column)] * sampled[column])
+                        .sum();
                     largest = largest.max(value.abs());
                     out.push(value);
                 }
@@ -382,7 +396,10 @@ impl Certifier {
                 for point in 0..t {
                     let mut raw = [[0.0; 3]; 3];
                     for level in 0..=order {
-                        let (value, slope) = (lines.values[w * (order + 1) + level], lines.derivatives[0][w * (order + 1) + level]);
+                        let (value, slope) = (
+                            lines.values[w * (order + 1) + level],
+                            lines.derivatives[0][w * (order + 1) + level],
+                        );
                         let table: &Table<2> = &tables[level.min(2)];
                         for function in 0..table.functions {
                             let c = coefficients[level * table.functions + function];
@@ -414,7 +431,11 @@ impl Certifier {
             for level in 0..m {
                 for row in 0..t {
                     for point in 0..t {
-                        accumulate(&mut control[level * t + row], &along[level * t + point], convert[(row, point)]);
+                        accumulate(
+                            &mut control[level * t + row],
+                            &along[level * t + point],
+                            convert[(row, point)],
+                        );
                     }
                 }
             }
@@ -500,7 +521,14 @@ impl Certifier {
         for matrix in control.iter() {
             let m = [0, 1, 2].map(|row| [0, 1, 2].map(|column| dot(rows[row], matrix[column])));
             let entry = |i: usize, j: usize| 0.5 * (m[i][j] + m[j][i]) - if i == j { delta } else { 0.0 };
-            let (a, b, c, d, e, f) = (entry(0, 0), entry(0, 1), entry(0, 2), entry(1, 1), entry(1, 2), entry(2, 2));
+            let (a, b, c, d, e, f) = (
+                entry(0, 0),
+                entry(0, 1),
+                entry(0, 2),
+                entry(1, 1),
+                entry(1, 2),
+                entry(2, 2),
+            );
             let minor = a * d - b * b;
             let whole = f * minor - a * e * e + 2.0 * b * c * e - c * c * d;
             if !(a > 1e-14 && minor > 1e-14 && whole > 1e-14) {
@@ -545,7 +573,9 @@ fn binomial(n: usize, k: usize) -> f64 {
 
 /// The inverse of a collocation matrix, which is regular for the points used here.
 fn inverted(matrix: DMatrix<f64>) -> DMatrix<f64> {
-    matrix.try_inverse().expect("Bernstein polynomials are independent at these points")
+    matrix
+        .try_inverse()
+        .expect("Bernstein polynomials are independent at these points")
 }
 
 /// Chebyshev points of the unit interval.

@@ -10,8 +10,8 @@
 
 use super::batches::{Batch, Batches, Group, load_coefficients};
 use super::element::Room;
-use crate::energy::spectrum::{Slopes, stress_by_invariants};
 use crate::energy::mapping::Density;
+use crate::energy::spectrum::{Slopes, stress_by_invariants};
 use crate::energy::{Energy, Variables, invariants};
 use crate::linalg::eigen3::symmetric_eigen;
 use crate::linalg::lanes::{Lanes, Vector, WIDTH, load, store};

@@ -40,7 +40,11 @@ pub const RULES: &[(&str, Rule, &str)] = &[
         Rule::Lobatto,
         "Gauss-Lobatto, with points on faces, edges and corners; Gauss and a tenth of a lattice in triangles and tetrahedra",
     ),
-    ("gauss", Rule::Gauss, "Gauss-Legendre; collapsed Gauss-Jacobi in triangles and tetrahedra"),
+    (
+        "gauss",
+        Rule::Gauss,
+        "Gauss-Legendre; collapsed Gauss-Jacobi in triangles and tetrahedra",
+    ),
     (
         "trapezoid",
         Rule::Trapezoid,

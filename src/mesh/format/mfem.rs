@@ -45,7 +45,11 @@ pub(super) fn read(bytes: &[u8]) -> Result<Content, Fault> {
         if same(word, "dimension") {
             text.integer(format_args!("the dimension"))?;
         } else if same(word, "elements") || same(word, "boundary") {
-            let name = if same(word, "elements") { "element" } else { "boundary element" };
+            let name = if same(word, "elements") {
+                "element"
+            } else {
+                "boundary element"
+            };
             let count = text.count(format_args!("the number of {name}s"), 4)?;
             for number in 0..count {
                 let label = text.integer(format_args!("the attribute of {name} {number}"))?;
@@ -80,7 +84,10 @@ pub(super) fn read(bytes: &[u8]) -> Result<Content, Fault> {
             }
             let dimension = text.integer(format_args!("the number of coordinates"))?;
             if !(1..=3).contains(&dimension) {
-                return Err(Fault::text(at, format!("vertices with {dimension} coordinates; 1 to 3 are known")));
+                return Err(Fault::text(
+                    at,
+                    format!("vertices with {dimension} coordinates; 1 to 3 are known"),
+                ));
             }
             let mut list = Vec::with_capacity(count);
             for number in 0..count {
@@ -117,20 +124,30 @@ pub(super) fn write(content: &Content) -> Result<Written, String> {
     let mut out = Vec::with_capacity(64 * content.points.len() + 32 * content.cells().count() + 256);
     let labels = reference_labels(&content.cell_data);
     let cells = content.cells();
-    let surface = CellKind::SURFACE.iter().map(|&kind| cells.count_of(kind)).sum::<usize>();
+    let surface = CellKind::SURFACE
+        .iter()
+        .map(|&kind| cells.count_of(kind))
+        .sum::<usize>();
     let solid = cells.count() > surface;
     // Writing to memory cannot fail.
     let _ = write!(out, "MFEM mesh v1.0\n\ndimension\n{}\n", if solid { 3 } else { 2 });
     for (title, wanted) in [("elements", solid), ("boundary", !solid)] {
         // Rows run over all cells in their order, whichever section they go to.
         let here = |kind: CellKind| CellKind::SURFACE.contains(&kind) != wanted;
-        let count: usize = CellKind::ALL.into_iter().filter(|&kind| here(kind)).map(|kind| cells.count_of(kind)).sum();
+        let count: usize = CellKind::ALL
+            .into_iter()
+            .filter(|&kind| here(kind))
+            .map(|kind| cells.count_of(kind))
+            .sum();
         let _ = write!(out, "\n{title}\n{count}\n");
         for (row, (kind, corners)) in cells.iter().enumerate() {
             if !here(kind) {
                 continue;
             }
-            let geometry = GEOMETRIES.iter().find(|entry| entry.1 == kind).map_or(0, |entry| entry.0);
+            let geometry = GEOMETRIES
+                .iter()
+                .find(|entry| entry.1 == kind)
+                .map_or(0, |entry| entry.0);
             let label = labels.map_or(1, |labels| labels[row] as i64);
             let _ = write!(out, "{label} {geometry}");
             for corner in corners {

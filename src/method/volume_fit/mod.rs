@@ -24,9 +24,9 @@ pub mod untangle;
 use super::model::ModelKind;
 use super::setting::Field;
 use super::{Failure, Inputs, Method, Outcome, Traces};
+use crate::energy::mapping::Density;
 use crate::fem::batches::{Batches, references_of_volume};
 use crate::fem::boundary::Boundary;
-use crate::energy::mapping::Density;
 use crate::fem::space::{Kind, Space};
 use crate::fem::volume_energy::VolumeEnergy;
 use crate::linalg::vector3::Columns;
@@ -397,7 +397,11 @@ impl<'a> Fit<'a> {
             }
             observer.phase("certify");
             let certificates = outcome::certify(&self.space, &self.references, &self.x, observer);
-            let failing = certificates.verdicts.iter().filter(|verdict| **verdict == outcome::Judged::Fails).count();
+            let failing = certificates
+                .verdicts
+                .iter()
+                .filter(|verdict| **verdict == outcome::Judged::Fails)
+                .count();
             if failing == 0 {
                 break;
             }

@@ -479,7 +479,9 @@ pub fn certify(space: &Space, references: &[Columns<f64>], x: &[f64], observer: 
     while result.verdicts.len() < cells {
         if observer.stop().is_some() {
             result.verdicts.resize(cells, Judged::Undecided);
-            result.notices.push("stopped from outside before every element was judged".to_string());
+            result
+                .notices
+                .push("stopped from outside before every element was judged".to_string());
             break;
         }
         let start = result.verdicts.len();
@@ -502,7 +504,11 @@ pub fn certify(space: &Space, references: &[Columns<f64>], x: &[f64], observer: 
         }
     }
     if let Some((cell, point, value)) = first {
-        let count = result.verdicts.iter().filter(|verdict| **verdict == Judged::Fails).count();
+        let count = result
+            .verdicts
+            .iter()
+            .filter(|verdict| **verdict == Judged::Fails)
+            .count();
         result.notices.push(format!(
             "{count} elements are not valid everywhere; the first is element {cell}, whose determinant is {value:.3e} at \
              {point:.4?} in its canonical coordinates"

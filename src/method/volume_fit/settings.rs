@@ -60,7 +60,10 @@ pub static FIELDS: &[Field] = &[
         name: "preset",
         kind: Kind::Choice(&[
             ("best", "integrated Legendre, Lobatto quadrature, preconditioned L-BFGS"),
-            ("paper", "integrated Fourier, trapezoid rule, plain L-BFGS until the gradient norm is 1e-8"),
+            (
+                "paper",
+                "integrated Fourier, trapezoid rule, plain L-BFGS until the gradient norm is 1e-8",
+            ),
         ]),
         default: Default::Text("best"),
         doc: "Chooses every setting that the file leaves open. A setting in the file wins over the preset.",

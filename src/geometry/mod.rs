@@ -6,5 +6,4 @@ pub mod point_tree;
 pub mod restricted_voronoi;
 pub mod squared_distance;
 pub mod centroidal_voronoi;
-pub mod closest_point;
 pub mod ray;

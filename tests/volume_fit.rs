@@ -77,14 +77,16 @@ fn a_fit_is_valid_falls_in_every_stage_and_is_the_same_with_any_number_of_thread
 
 #[test]
 fn an_inverted_mesh_is_repaired_over_its_own_boundary() {
-    // Pillowed far beyond the middle: the boundary's cells are turned inside out.
+    // Pillowed beyond the middle: the cells inside are turned inside out.
     let outcome = fit(
-        json!({ "generate": "grid", "x": 2, "y": 2, "z": 1, "recipe": [{ "op": "pillow", "thickness": 0.9 }] }),
+        json!({ "generate": "grid", "x": 2, "y": 2, "z": 1, "recipe": [{ "op": "pillow", "thickness": 1.3 }] }),
         None,
         json!({ "schedule": [{ "lambda": 0.05, "order": 1 }], "iteration_limit": 40, "distance": "symmetric" }),
     )
     .unwrap();
+    assert!(outcome.metrics["inverted_at_start"] > 0.0);
     assert_eq!(outcome.metrics["inverted"], 0.0);
+    assert!(outcome.metrics["hausdorff"] < 5.0, "{}", outcome.metrics["hausdorff"]);
 }
 
 #[test]

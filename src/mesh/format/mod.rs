@@ -404,12 +404,6 @@ fn check_fields(of: &str, fields: &[Field], rows: usize) -> Result<(), String> {
 
 /// Formats that are told from ours, so that the message can name them.
 fn recognised_only(bytes: &[u8]) -> Option<&'static str> {
-    if bytes.starts_with(b"MFEM ") {
-        return Some(
-            "this is a mesh in MFEM's own text format, not MEDIT; convert it with MFEM (`Mesh::PrintVTU`, or `mesh-explorer` and its \
-             VTK output) and pass the .vtu or .vtk file",
-        );
-    }
     if bytes.starts_with(&[1, 0, 0, 0]) && matches!(bytes.get(4..8), Some([1..=4, 0, 0, 0])) {
         return Some("this is a binary MEDIT file (.meshb); convert it to the ASCII form (.mesh)");
     }

@@ -171,11 +171,15 @@ struct Fit<'a> {
     extra_points: usize,
 }
 
+/// Share of the least determinant that a step must leave.
+const LEAST_SHARE: f64 = 0.2;
+
 /// Tells the world and remembers.
 struct Recorder<'a> {
     observer: &'a mut dyn Observer,
     rows: &'a mut Vec<[f64; 10]>,
     latest: Rc<Cell<Parts>>,
+    floor: Rc<Cell<f64>>,
     /// Accepted steps before this minimization, and whether its start is already recorded.
     before: u64,
     skip_start: bool,
@@ -192,6 +196,7 @@ impl Observer for Recorder<'_> {
     }
 
     fn iterate(&mut self, iterate: &Iterate) {
+        self.floor.set(LEAST_SHARE * self.latest.get().least_determinant);
         if iterate.iteration == 0 && self.skip_start {
             return;
         }
@@ -429,6 +434,13 @@ impl<'a> Fit<'a> {
         self.lambda = stage.lambda;
         let order = self.space.orders.iter().copied().max().unwrap_or(1);
         let volume = self.volume_energy(&self.space)?;
+        if !volume.value(&self.x).value.is_finite()
+            && settings.untangle
+            && let Some(stop) = untangle::untangle(self, observer)?
+        {
+            // More points than in the stage before found an inversion.
+            return Ok((stop, "stopped from outside while elements were untangled".to_string()));
+        }
         let boundary = Boundary::new(&self.volume, &self.topology, &self.space, self.intervals(order));
         let mut samples = Vec::new();
         boundary.positions(&self.x, &mut samples);
@@ -446,9 +458,12 @@ impl<'a> Fit<'a> {
             None
         };
         let latest = Rc::new(Cell::new(Parts::default()));
+        let floor = Rc::new(Cell::new(f64::NEG_INFINITY));
         let factor = surface.as_ref().map_or(0.0, SurfaceEnergy::factor);
         let mut done = 0;
         let mut previous = f64::INFINITY;
+        // The energy when a round last ended for its small change.
+        let mut settled = f64::INFINITY;
         let outcome = loop {
             let preconditioner = if settings.preconditioned {
                 boundary.positions(&self.x, &mut samples);
@@ -483,6 +498,7 @@ impl<'a> Fit<'a> {
                 lambda: stage.lambda,
                 preconditioner,
                 latest: latest.clone(),
+                floor: floor.clone(),
                 samples: Vec::new(),
                 forces: Vec::new(),
                 room: Vec::new(),
@@ -501,6 +517,7 @@ impl<'a> Fit<'a> {
             let mut recorder = Recorder {
                 observer,
                 latest: latest.clone(),
+                floor: floor.clone(),
                 before: self.counters["iterations"],
                 skip_start: done > 0,
                 stage: self.stages,
@@ -516,7 +533,16 @@ impl<'a> Fit<'a> {
             done += solution.counters.iterations;
             self.count("iterations", solution.counters.iterations);
             self.count("evaluations", solution.counters.evaluations);
-            let more = solution.stop == StopReason::StepLimit && done < stage.iterations;
+            // A step cut short by the barrier changes little as well: only when a fresh start finds nothing either has the
+            // stage converged.
+            let by_change = solution.stop == StopReason::Converged && solution.gradient_norm >= settings.gradient_tolerance;
+            let again = by_change
+                && solution.counters.iterations > 0
+                && settled - solution.value > 5.0 * settings.change_tolerance * solution.value.abs();
+            if again {
+                settled = solution.value;
+            }
+            let more = (solution.stop == StopReason::StepLimit || again) && done < stage.iterations;
             if !more {
                 // The parts at the accepted point, not at the last one tried.
                 let mut gradient = vec![0.0; self.x.len()];

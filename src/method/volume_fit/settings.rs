@@ -233,7 +233,7 @@ pub static FIELDS: &[Field] = &[
         name: "change_tolerance",
         kind: Kind::Number { min: 0.0, max: 1.0 },
         default: Default::Absent,
-        doc: "A stage has converged when an iteration lowers the energy by less than this share. Preset best: 1e-4, paper: 0.",
+        doc: "A stage has converged when an iteration lowers the energy by less than this share. Preset best: 1e-5, paper: 0.",
     },
     Field {
         name: "untangle",
@@ -448,7 +448,7 @@ impl Settings {
             change_tolerance: settings
                 .get("change_tolerance")
                 .and_then(Value::as_f64)
-                .unwrap_or(if paper { 0.0 } else { 1e-4 }),
+                .unwrap_or(if paper { 0.0 } else { 1e-5 }),
             untangle: flag("untangle"),
             repairs: whole("repairs").unwrap_or(if paper { 0 } else { 3 }),
         })

@@ -73,6 +73,7 @@ pub(super) fn untangle(fit: &mut Fit<'_>, observer: &mut dyn Observer) -> Result
             lambda: 0.05,
             preconditioner: None,
             latest: latest.clone(),
+            floor: Rc::new(Cell::new(f64::NEG_INFINITY)),
             samples: Vec::new(),
             forces: Vec::new(),
             room: Vec::new(),

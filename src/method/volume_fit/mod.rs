@@ -535,7 +535,8 @@ impl<'a> Fit<'a> {
             self.count("evaluations", solution.counters.evaluations);
             // A step cut short by the barrier changes little as well: only when a fresh start finds nothing either has the
             // stage converged.
-            let by_change = solution.stop == StopReason::Converged && solution.gradient_norm >= settings.gradient_tolerance;
+            let by_change =
+                solution.stop == StopReason::Converged && solution.gradient_norm >= settings.gradient_tolerance;
             let again = by_change
                 && solution.counters.iterations > 0
                 && settled - solution.value > 5.0 * settings.change_tolerance * solution.value.abs();

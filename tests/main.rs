@@ -34,5 +34,6 @@ mod squared_distance;
 mod store;
 mod surface_fit;
 mod tiny_method;
+mod volume_fit;
 mod volume_map;
 mod volume_map_feasibility;

@@ -1,6 +1,7 @@
 //! One test binary; a file a property.
 
 mod catmull_clark;
+mod centroidal_voronoi;
 mod closest_point;
 mod commands;
 mod connectivity;
@@ -33,5 +34,6 @@ mod squared_distance;
 mod store;
 mod surface_fit;
 mod tiny_method;
+mod volume_fit;
 mod volume_map;
 mod volume_map_feasibility;

@@ -254,8 +254,14 @@ pub fn build(problem: &Problem, settings: &Settings, observer: &mut dyn Observer
                     natural: natural.clone(),
                 };
                 let mut changed = network.clone();
-                let found = balance::balance(&mut changed, settings.tangent_stiffness, Some(start), observer)
-                    .map_err(problem::invalid)?;
+                let balanced = balance::balance(&mut changed, settings.tangent_stiffness, Some(start), observer);
+                let found = match balanced {
+                    Ok(found) => found,
+                    Err(error) => {
+                        notices.push(format!("folded patches are left as they are, their repair failed: {error}"));
+                        break;
+                    }
+                };
                 if !(found.residual < MET) {
                     continue;
                 }

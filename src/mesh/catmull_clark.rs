@@ -5,7 +5,8 @@
 //! faces and edges that are named as creases stay sharp: they follow the cubic B-spline of their own vertices. Vertices
 //! with three or more sharp edges stay where they are, and so do those at which several surfaces touch in a point.
 //!
-//! Guaranteed: rows of weights sum to 1.
+//! Guaranteed: rows of weights sum to 1. Not guaranteed: the exact limit of a vertex at which one crease ends inside the
+//! surface, which [`limit`] takes for smooth; each level of subdivision before it makes the error smaller.
 
 use super::linear_map::LinearMap;
 use super::surface::{Edge, Surface};

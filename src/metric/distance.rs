@@ -211,7 +211,7 @@ pub fn one_sided(surface: &TriangleMesh, to: &ClosestPoint, sampling: Sampling) 
     // First those that may hold the maximum, then all others against the maximum that came out.
     for promising in [true, false] {
         let (sampled, tolerance) = if promising {
-            (max, SHARP * max)
+            (max, (SHARP * max).min(sampling.tolerance))
         } else {
             (
                 sums.iter().fold(0.0, |max: f64, sums| max.max(sums.max)),

@@ -9,7 +9,7 @@ use crate::geometry::point_tree::PointTree;
 use crate::geometry::squared_distance::{Options, SquaredDistance, Wanted};
 use crate::mesh::format::{Cells, vtu};
 use crate::mesh::surface::Surface;
-use crate::mesh::{self, TriangleMesh, area_vector, length, subtract};
+use crate::mesh::{TriangleMesh, area_vector, length, subtract};
 use crate::method::Failure;
 use crate::metric::distance::{self, Distance, Hausdorff};
 use std::collections::BTreeMap;
@@ -211,23 +211,24 @@ fn euler(surface: &Surface) -> (i64, bool) {
     )
 }
 
-/// Both surfaces in one file: the fit where it is, the target moved aside along x.
+/// The way in which the target is moved, in the plane of x and y: across the picture as seen from the front right.
+const ASIDE: [f64; 2] = [0.78, 0.625_779_514_526_485_2];
+
+/// Both surfaces in one file: the fit where it is, the target moved aside.
 fn side_by_side(problem: &Problem, fitted: &Surface, jacobians: &[f64], hausdorff: &Hausdorff) -> Vec<u8> {
     let target = &problem.target;
     let mut points = problem.to_given_units(&fitted.points);
     let first = points.len() as u32;
-    let width = match (mesh::bounding_box(&points), mesh::bounding_box(&target.points)) {
-        (Some([low, high]), Some([from, to])) => {
-            let shift = high[0] - problem.centre[0] - problem.diagonal * from[0];
-            let room = 0.1 * (high[0] - low[0]).max(problem.diagonal * (to[0] - from[0]));
-            shift + room
-        }
-        _ => problem.diagonal,
-    };
-    points.extend(problem.to_given_units(&target.points).into_iter().map(|mut point| {
-        point[0] += width;
-        point
-    }));
+    let moved = problem.to_given_units(&target.points);
+    let along = |point: &[f64; 3]| point[0] * ASIDE[0] + point[1] * ASIDE[1];
+    let end = points.iter().map(along).fold(f64::NEG_INFINITY, f64::max);
+    let start = moved.iter().map(along).fold(f64::INFINITY, f64::min);
+    let shift = end - start + 0.05 * problem.diagonal;
+    points.extend(
+        moved
+            .into_iter()
+            .map(|[x, y, z]| [x + shift * ASIDE[0], y + shift * ASIDE[1], z]),
+    );
     // Triangles come first in the file, of the fit and then of the target; then the fit's quadrilaterals.
     let own = fitted.triangles.len();
     let mut triangles = fitted.triangles.clone();

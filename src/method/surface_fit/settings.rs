@@ -224,7 +224,7 @@ pub struct Settings {
     pub refinements: usize,
     pub sampling: Sampling,
     pub samples: usize,
-    pub sampling_iterations: usize,
+    pub sampling_iterations: u64,
     pub seed: u64,
     pub iteration_limit: u64,
     pub change_tolerance: Vec<f64>,

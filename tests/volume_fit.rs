@@ -43,7 +43,7 @@ fn a_fit_is_valid_falls_in_every_stage_and_is_the_same_with_any_number_of_thread
             fit(
                 json!({ "generate": "grid", "x": 1, "y": 1, "z": 1, "recipe": [{ "op": "pillow" }] }),
                 Some(json!({ "shape": "ellipsoid", "triangles": 400 })),
-                json!({ "order": 2, "iteration_limit": 25 }),
+                json!({ "order": 2, "iteration_limit": 25, "lambda_far": 50.0 }),
             )
             .unwrap()
         })

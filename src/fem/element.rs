@@ -82,7 +82,7 @@ enum Factors {
     },
     Prism {
         /// Value, derivatives by u and v of the triangle functions, for the bottom, the top and all other levels.
-        triangles: [[Matrix; 3]; 3],
+        triangles: Box<[[Matrix; 3]; 3]>,
         values: Matrix,
         slopes: Matrix,
     },
@@ -135,7 +135,7 @@ impl Element {
                         .map(|entries| Matrix::of(&table, entries))
                 };
                 Factors::Prism {
-                    triangles: [level(kind.last[0]), level(kind.last[1]), level(2)],
+                    triangles: Box::new([level(kind.last[0]), level(kind.last[1]), level(2)]),
                     values: Matrix::of(&table, &table.values),
                     slopes: Matrix::of(&table, &table.derivatives[0]),
                 }

@@ -66,6 +66,6 @@ fn mirrored(j: usize, x: f64) -> (f64, f64) {
     if x <= 0.5 {
         (x, 1.0)
     } else {
-        (1.0 - x, if j % 2 == 0 { -1.0 } else { 1.0 })
+        (1.0 - x, if j.is_multiple_of(2) { -1.0 } else { 1.0 })
     }
 }

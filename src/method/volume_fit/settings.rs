@@ -87,8 +87,9 @@ pub static FIELDS: &[Field] = &[
     Field {
         name: "lambda_far",
         kind: Kind::Number { min: 0.0, max: 1e9 },
-        default: Default::Number(50.0),
-        doc: "Weight of the volume energy in the far phase; 0 leaves the far phase out.",
+        default: Default::Absent,
+        doc: "Weight of the volume energy in the far phase; 0 leaves the far phase out. Preset best: 0, because a template in \
+              the target's box is near enough and a stiff phase bends thin layers; paper: 50.",
     },
     Field {
         name: "lambda",
@@ -359,6 +360,8 @@ impl Settings {
                 (if paper { *printed } else { *best }).to_string()
             })
         };
+        let far = settings.get("lambda_far").and_then(Value::as_f64);
+        let far = far.unwrap_or(if paper { 50.0 } else { 0.0 });
         let order = number("order") as usize;
         let limit = number("iteration_limit") as u64;
         let mut stages = Vec::new();
@@ -381,7 +384,7 @@ impl Settings {
                 stages = default_schedule(
                     order,
                     &text("raise"),
-                    number("lambda_far"),
+                    far,
                     number("lambda"),
                     number("far_steps") as usize,
                     limit,

@@ -6,6 +6,7 @@
 use std::hint::black_box;
 use std::time::Instant;
 use vargeo::energy::find;
+use vargeo::energy::mapping::Density;
 use vargeo::fem::basis;
 use vargeo::fem::batches::{Batches, references_of_volume};
 use vargeo::fem::quadrature::Rule;
@@ -78,7 +79,8 @@ fn main() {
                     Rule::Gauss.cell(kind.shape, kind.order + 1)
                 });
                 let energy_of = find(energy).expect("a listed energy");
-                let mut volume = VolumeEnergy::new(batches.expect("batches"), energy_of).expect("an energy");
+                let mut volume =
+                    VolumeEnergy::new(batches.expect("batches"), Density::new(energy_of)).expect("an energy");
                 let x = space.linear(&mesh.points);
                 let mut gradient = vec![0.0; x.len()];
                 for processor in Processor::available().into_iter().rev() {

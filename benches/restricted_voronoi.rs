@@ -1,18 +1,23 @@
 //! Time of the restricted Voronoi diagram with the centroidal energy and its gradient, on one thread and on several.
 //!
 //! `cargo bench --bench restricted_voronoi -- [surface.obj] [sites...]`; a bumpy torus of 60k triangles and 1k, 10k and 100k
-//! sites by default. Sites are spread at random and relaxed by Lloyd's iteration. Each figure is the best of several runs.
+//! sites by default. Sites are spread at random and relaxed by Lloyd's iteration. Figures for
+//! one thread are its own time, for several the time on the wall; the best of several runs. `l-bfgs`: 30 iterations from
+//! scattered sites.
 
+use std::f64::consts::TAU;
 use std::time::Instant;
+use vargeo::geometry::centroidal_voronoi::{Method, Relaxation, relax, scatter};
 use vargeo::geometry::point_tree::PointTree;
 use vargeo::geometry::squared_distance::{Anisotropy, Options, SquaredDistance, Wanted};
+use vargeo::optimize::Silent;
 
 fn torus(n: usize, m: usize) -> (Vec<[f64; 3]>, Vec<[u32; 3]>) {
     let mut points = Vec::new();
     let mut cells = Vec::new();
     for i in 0..n {
         for j in 0..m {
-            let (a, b) = (i as f64 / n as f64 * 6.283185307, j as f64 / m as f64 * 6.283185307);
+            let (a, b) = (i as f64 / n as f64 * TAU, j as f64 / m as f64 * TAU);
             let radius = 0.35 * (1.0 + 0.1 * (7.0 * a).sin() * (5.0 * b).cos());
             let ring = 1.0 + radius * b.cos();
             points.push([ring * a.cos(), ring * a.sin(), radius * b.sin()]);
@@ -47,66 +52,17 @@ fn read(path: &str) -> (Vec<[f64; 3]>, Vec<[u32; 3]>) {
     (points, cells)
 }
 
-/// Random points on the surface, evenly by area.
-fn spread(points: &[[f64; 3]], cells: &[[u32; 3]], count: usize) -> Vec<[f64; 3]> {
-    let mut state = 7u64;
-    let mut random = || {
-        state = state
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        (state >> 11) as f64 / (1u64 << 53) as f64
-    };
-    let mut sums = vec![0.0];
-    for cell in cells {
-        let [a, b, c] = cell.map(|v| points[v as usize]);
-        let (x, y): ([f64; 3], [f64; 3]) = (
-            std::array::from_fn(|k| b[k] - a[k]),
-            std::array::from_fn(|k| c[k] - a[k]),
-        );
-        let n = [
-            x[1] * y[2] - x[2] * y[1],
-            x[2] * y[0] - x[0] * y[2],
-            x[0] * y[1] - x[1] * y[0],
-        ];
-        let area = n.iter().map(|n| n * n).sum::<f64>().sqrt();
-        sums.push(sums[sums.len() - 1] + area);
-    }
-    (0..count)
-        .map(|_| {
-            let place = random() * sums[sums.len() - 1];
-            let triangle = sums.partition_point(|&sum| sum <= place).clamp(1, cells.len()) - 1;
-            let (mut s, mut t) = (random(), random());
-            if s + t > 1.0 {
-                (s, t) = (1.0 - s, 1.0 - t);
-            }
-            let [a, b, c] = cells[triangle].map(|v| points[v as usize]);
-            std::array::from_fn(|k| a[k] + s * (b[k] - a[k]) + t * (c[k] - a[k]))
-        })
-        .collect()
-}
-
-/// Seconds that this thread has run, so that other load does not count; wall time where the system does not tell.
-fn clock(start: Instant) -> f64 {
-    let told = std::fs::read_to_string("/proc/thread-self/schedstat").ok();
-    match told
-        .as_deref()
-        .and_then(|text| text.split(' ').next())
-        .and_then(|word| word.parse::<f64>().ok())
-    {
-        Some(nanoseconds) => nanoseconds * 1e-9,
-        None => start.elapsed().as_secs_f64(),
-    }
+/// Seconds that this thread has run, so that other load does not count.
+fn clock() -> f64 {
+    let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
+    time.tv_sec as f64 + time.tv_nsec as f64 * 1e-9
 }
 
 /// Milliseconds of the quickest run: of this thread alone, or by the clock on the wall.
 fn best(runs: usize, alone: bool, mut work: impl FnMut()) -> f64 {
     let start = Instant::now();
     let now = || {
-        if alone {
-            clock(start)
-        } else {
-            start.elapsed().as_secs_f64()
-        }
+        if alone { clock() } else { start.elapsed().as_secs_f64() }
     };
     (0..runs).fold(f64::INFINITY, |best, _| {
         let begin = now();
@@ -125,11 +81,11 @@ fn main() {
     let (points, cells) = file.map_or_else(|| torus(300, 100), |file| read(file));
     println!("{} triangles; milliseconds", cells.len());
     println!(
-        "{:>8} {:>7} {:>9} {:>9} {:>9} {:>9} {:>9} {:>8}",
-        "sites", "threads", "tree", "value", "gradient", "s=50", "surface", "pieces"
+        "{:>8} {:>7} {:>9} {:>9} {:>9} {:>9} {:>9} {:>9} {:>8}",
+        "sites", "threads", "tree", "value", "gradient", "s=50", "surface", "l-bfgs", "pieces"
     );
     for &count in &counts {
-        let mut sites = spread(&points, &cells, count);
+        let mut sites = scatter(&points, &cells, count, 7);
         let mut term = SquaredDistance::new(&points, &cells).expect("a valid surface");
         let mut tree = PointTree::default();
         let mut areas = vec![0.0; count];
@@ -185,8 +141,17 @@ fn main() {
                     };
                     term.evaluate(&points, &tree, &plain, wanted);
                 });
+                let start = scatter(&points, &cells, count, 1);
+                let relaxation = Relaxation {
+                    method: Method::Lbfgs,
+                    iterations: 30,
+                    tolerance: 0.0,
+                };
+                let relaxed = best(1, threads == 1, || {
+                    relax(&mut term, &points, &start, &relaxation, &mut Silent);
+                });
                 println!(
-                    "{count:>8} {threads:>7} {build:>9.2} {value:>9.2} {gradient:>9.2} {anisotropic:>9.2} {surface:>9.2} {pieces:>8}"
+                    "{count:>8} {threads:>7} {build:>9.2} {value:>9.2} {gradient:>9.2} {anisotropic:>9.2} {surface:>9.2} {relaxed:>9.1} {pieces:>8}"
                 );
             });
         }

@@ -771,7 +771,7 @@ fn content_outranks_the_name_and_foreign_formats_are_named() {
     assert_eq!(content.triangles, [[0, 1, 2]]);
     assert!(content.notices[0].contains("OFF"), "{:?}", content.notices);
     for (bytes, word) in [
-        (&b"MFEM mesh v1.0\n\ndimension\n3\n"[..], "MFEM"),
+        (&b"MFEM mesh v1.0\n\ndimension\n3\n"[..], "vertices"),
         (&[1, 0, 0, 0, 2, 0, 0, 0, 3, 0, 0, 0][..], "binary MEDIT"),
         (
             b"<?xml version=\"1.0\"?><VTKFile type=\"PolyData\"></VTKFile>",

@@ -1,6 +1,7 @@
 //! One test binary; a file a property.
 
 mod catmull_clark;
+mod centroidal_voronoi;
 mod closest_point;
 mod commands;
 mod connectivity;
@@ -11,6 +12,7 @@ mod energies;
 mod experiment_files;
 mod floors;
 mod formats;
+mod g1_surface;
 mod gate;
 mod generators;
 mod kernels;
@@ -21,6 +23,7 @@ mod mixed_fem;
 mod optimizers;
 mod page;
 mod plan;
+mod quadrilaterals;
 mod rates;
 mod reports;
 mod restricted_voronoi;
@@ -31,5 +34,6 @@ mod squared_distance;
 mod store;
 mod surface_fit;
 mod tiny_method;
+mod volume_fit;
 mod volume_map;
 mod volume_map_feasibility;

@@ -5,7 +5,6 @@ use vargeo::fem::surface::SurfaceOperators;
 use vargeo::mesh::format;
 use vargeo::mesh::planar::{self, Domain, FAMILIES, Family};
 use vargeo::method::mixed_fem::MixedFem;
-use vargeo::method::mixed_fem::settings::Settings;
 use vargeo::method::model::{LoadedModel, Part};
 use vargeo::method::{Failure, Inputs, Method, Outcome};
 use vargeo::optimize::Silent;
@@ -187,9 +186,33 @@ fn the_stabilised_system_converges_where_others_do_not() {
 }
 
 #[test]
+fn symmetric_pivots_hold_for_the_mixed_systems_of_larger_meshes() {
+    for (family, condition) in [
+        ("regular", "region"),
+        ("regular", "curve"),
+        ("minimum-angle-30", "curve"),
+    ] {
+        for equation in ["biharmonic", "triharmonic"] {
+            let settings = json!({
+                "equation": equation, "condition": condition, "system": "mixed", "solver": "lblt", "compare": true,
+            });
+            let outcome = run(generated("square", json!({ "family": family, "cells": 32 })), settings)
+                .unwrap_or_else(|failure| panic!("{family}, {condition}, {equation}: {}", failure.reason));
+            let difference = outcome.metrics["difference"];
+            assert!(difference < 1e-6, "{family}, {condition}, {equation}: {difference:e}");
+        }
+    }
+}
+
+#[test]
 fn singular_configurations_are_found_and_named() {
     // Nullities that the independent program measured.
-    for (family, nullity) in [("regular", 8.0), ("union-jack", 8.0), ("criss-cross", 4.0)] {
+    // Neighbourhoods alone do not show that of the criss-cross mesh.
+    for (family, nullity, bound) in [
+        ("regular", 8.0, 8.0),
+        ("union-jack", 8.0, 8.0),
+        ("criss-cross", 4.0, 0.0),
+    ] {
         let settings = json!({ "equation": "triharmonic", "condition": "curve", "curve": "unstabilised" });
         let failure = run(
             generated("square", json!({ "family": family, "cells": 4 })),
@@ -197,12 +220,13 @@ fn singular_configurations_are_found_and_named() {
         )
         .expect_err("a singular system");
         assert_eq!(failure.kind, "singular");
-        assert!(failure.reason.contains("Proposition 2"), "{}", failure.reason);
+        let named = failure.reason.contains("Proposition 2") && failure.reason.contains("meet no free vertex but");
+        assert!(named || bound == 0.0, "{}", failure.reason);
         let mut settings = settings;
         settings["on_singular"] = json!("continue");
         settings["system"] = json!("mixed");
         let outcome = run(generated("square", json!({ "family": family, "cells": 4 })), settings).expect("an outcome");
-        assert_eq!(outcome.metrics["nullity_bound"], nullity, "{family}");
+        assert_eq!(outcome.metrics["nullity_bound"], bound, "{family}");
         assert_eq!(outcome.metrics["nullity"], nullity, "{family}");
     }
 }

@@ -5,6 +5,7 @@ use serde_json::{Value, json};
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
+use vargeo::experiment::claims::CLAIMS;
 use vargeo::experiment::diagnostic::{Diagnostic, render};
 use vargeo::experiment::document::{self, Content};
 use vargeo::experiment::file::Experiment;
@@ -279,7 +280,8 @@ fn every_experiment_that_ships_plans() {
             path.display()
         );
         count += 1;
-        assert!(claims.iter().all(|claim| claim.starts_with("VM")), "{}", path.display());
+        let known = |claim: &String| CLAIMS.iter().any(|known| known.id == claim);
+        assert!(claims.iter().all(known), "{}", path.display());
     }
     assert!(count >= 10, "{count} experiments");
 }

@@ -1,12 +1,16 @@
 //! Surfaces of quadrilaterals: connectivity, orientation, checks, splits, generators.
 
 use serde_json::{Value, json};
+use vargeo::linalg::vector3::{cross, dot, subtract};
 use vargeo::mesh::check::Severity;
 use vargeo::mesh::connectivity::NONE;
 use vargeo::mesh::format;
 use vargeo::mesh::generate::surface::{generate_surface, surfaces};
 use vargeo::mesh::quadrilateral::{Connectivity, QuadrilateralMesh, Triangles, check, orient, quad_and_corner};
-use vargeo::mesh::{cross, dot, length, subtract};
+
+fn length(vector: [f64; 3]) -> f64 {
+    dot(vector, vector).sqrt()
+}
 
 fn connect(mesh: &QuadrilateralMesh) -> Connectivity {
     Connectivity::of(&mesh.quads, mesh.points.len()).expect("an oriented surface")
@@ -30,7 +34,8 @@ fn grid(width: u32, height: u32) -> QuadrilateralMesh {
     }
     for j in 0..height {
         for i in 0..width {
-            mesh.quads.push([name(i, j), name(i + 1, j), name(i + 1, j + 1), name(i, j + 1)]);
+            mesh.quads
+                .push([name(i, j), name(i + 1, j), name(i + 1, j + 1), name(i, j + 1)]);
         }
     }
     mesh
@@ -55,7 +60,11 @@ fn stars_are_fans_in_cyclic_order() {
                 assert_eq!(mesh.quads[quad][place] as usize, vertex);
                 let edges = connectivity.quad_edges[quad];
                 assert_eq!(edges[place], spokes[index], "the right side of the corner");
-                assert_eq!(edges[(place + 3) % 4], spokes[(index + 1) % spokes.len()], "the left side");
+                assert_eq!(
+                    edges[(place + 3) % 4],
+                    spokes[(index + 1) % spokes.len()],
+                    "the left side"
+                );
             }
         }
         assert!(seen.into_iter().all(|seen| seen), "every corner stands in one star");
@@ -73,7 +82,13 @@ fn stars_are_fans_in_cyclic_order() {
 
 #[test]
 fn generated_surfaces_are_sound_and_lie_where_they_say() {
-    let topology = [("sphere", 2, 0), ("ellipsoid", 2, 0), ("head", 2, 0), ("torus", 0, 0), ("icosahedron", 2, 0)];
+    let topology = [
+        ("sphere", 2, 0),
+        ("ellipsoid", 2, 0),
+        ("head", 2, 0),
+        ("torus", 0, 0),
+        ("icosahedron", 2, 0),
+    ];
     for generator in surfaces() {
         let generated = generate_surface(generator.name, &Value::Null).expect("defaults");
         let mut mesh = generated.mesh.clone();
@@ -100,11 +115,18 @@ fn generated_surfaces_are_sound_and_lie_where_they_say() {
         for (point, normal) in mesh.points.iter().zip(normals) {
             assert!(exact.distance(*point) < 1e-12, "{}", generator.name);
             let off: [f64; 3] = std::array::from_fn(|axis| point[axis] + 0.01 * normal[axis]);
-            assert!((exact.distance(off) - 0.01).abs() < 1e-9, "{}: {}", generator.name, exact.distance(off));
+            assert!(
+                (exact.distance(off) - 0.01).abs() < 1e-9,
+                "{}: {}",
+                generator.name,
+                exact.distance(off)
+            );
         }
     }
     let poles = |valence: u32| {
-        let mesh = generate_surface("poles", &json!({ "valence": valence })).expect("valid").mesh;
+        let mesh = generate_surface("poles", &json!({ "valence": valence }))
+            .expect("valid")
+            .mesh;
         connect(&mesh).valences()
     };
     assert_eq!(poles(7)[7], 2);
@@ -127,7 +149,8 @@ fn damage_is_named_and_orientation_mended() {
     mesh.quads.push([1, 4, 7, 6]);
     assert!(message(mesh, "non-manifold-edge").contains("vertices 1 and 4 with 3"));
     let mut mesh = grid(1, 1);
-    mesh.points.extend([[-1.0, 0.0, 0.0], [-1.0, -1.0, 0.0], [0.0, -1.0, 0.0]]);
+    mesh.points
+        .extend([[-1.0, 0.0, 0.0], [-1.0, -1.0, 0.0], [0.0, -1.0, 0.0]]);
     mesh.quads.push([0, 4, 5, 6]);
     assert!(message(mesh, "pinched-vertex").contains("vertex 0"));
     // A Möbius strip of three quads.
@@ -169,7 +192,13 @@ fn quads_come_through_every_format_that_holds_them() {
         }],
         ..Default::default()
     };
-    for (name, keeps_normals) in [("a.obj", true), ("a.off", false), ("a.vtk", true), ("a.vtu", true), ("a.msh", true)] {
+    for (name, keeps_normals) in [
+        ("a.obj", true),
+        ("a.off", false),
+        ("a.vtk", true),
+        ("a.vtu", true),
+        ("a.msh", true),
+    ] {
         let format = format::Format::of_name(name).expect("a known extension");
         let written = format::write(format, &content).expect("every format holds quads");
         let read = format::read(name, &written.bytes).expect("what was written");

@@ -264,6 +264,29 @@ fn adversarial_inputs() {
         .map(|x| [1.5 + x[0], 1.5 + x[1], 0.3 + 0.01 * x[2]])
         .collect();
     check("cloud in the plane", &points, &cells, &cloud);
+    // Functions that come close to being lowest but are not.
+    for seed in 0..6 {
+        let mut random = Random(100 + seed);
+        let points = random.points(6);
+        let near: Vec<Point> = random
+            .points(400)
+            .iter()
+            .map(|x| {
+                let corners = &points[if x[2] > 0.0 { 0..3 } else { 3..6 }];
+                let (s, t) = (0.5 + 0.5 * x[0], 0.5 + 0.5 * x[1]);
+                let (s, t) = if s + t > 1.0 { (1.0 - s, 1.0 - t) } else { (s, t) };
+                std::array::from_fn(|k| {
+                    corners[0][k]
+                        + s * (corners[1][k] - corners[0][k])
+                        + t * (corners[2][k] - corners[0][k])
+                        + 0.1 * x[2]
+                })
+            })
+            .collect();
+        let (points, cells) = soup(points);
+        check("near the triangles", &points, &cells, &near);
+    }
+    let (points, cells) = square_at(0.3);
     for distance in [10.0, 1e3] {
         let far: Vec<Point> = random
             .points(300)

@@ -224,7 +224,7 @@ fn batch(space: &Space, references: &[Columns<f64>], kind: Kind, members: &[usiz
 }
 
 /// The reference for the functions' own frame of corners, which for a tetrahedron may be a reflection.
-fn in_frame(shape: Shape, corners: &[u8; 8], reference: &Columns<f64>) -> Columns<f64> {
+pub fn in_frame(shape: Shape, corners: &[u8; 8], reference: &Columns<f64>) -> Columns<f64> {
     let canonical = shape.canonical();
     let at = |place: usize| apply(reference, canonical[corners[place] as usize]);
     match shape {

@@ -224,7 +224,7 @@ fn halve(values: &[f64], axis: usize) -> [Vec<f64>; 2] {
 
 /// The determinant and the product of the columns' lengths at a point.
 pub fn jacobian(points: &ControlPoints, at: [f64; 3]) -> (f64, f64) {
-    let values = at.map(|t| bernstein(t));
+    let values = at.map(bernstein);
     let slopes = at.map(slope);
     let column = |axis: usize| -> [f64; 3] {
         let factor = |d: usize, index: usize| if d == axis { slopes[d][index] } else { values[d][index] };

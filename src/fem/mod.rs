@@ -17,4 +17,5 @@ pub mod element;
 pub mod batches;
 pub mod volume_energy;
 pub mod boundary;
+pub mod certificate;
 pub mod bernstein_hexahedron;

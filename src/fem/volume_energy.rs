@@ -10,6 +10,7 @@
 
 use super::batches::{Batch, Batches, Group, load_coefficients};
 use super::element::Room;
+use crate::energy::mapping::Density;
 use crate::energy::spectrum::{Slopes, stress_by_invariants};
 use crate::energy::{Energy, Variables, invariants};
 use crate::linalg::eigen3::symmetric_eigen;
@@ -33,7 +34,7 @@ pub struct Evaluation {
 /// The energy as a function of the nodes, three numbers each.
 pub struct VolumeEnergy {
     batches: Batches,
-    energy: &'static dyn Energy,
+    density: Density,
     processor: Processor,
     /// One over the sum of the reference volumes.
     normalization: f64,
@@ -47,8 +48,13 @@ pub struct VolumeEnergy {
 
 impl VolumeEnergy {
     /// # Errors
-    /// When the energy is no barrier and depends on singular values: its sign across an inversion is not provided for.
-    pub fn new(batches: Batches, energy: &'static dyn Energy) -> Result<VolumeEnergy, String> {
+    /// When the energy is no barrier and depends on singular values: its sign across an inversion is not provided for; or
+    /// when a second barrier is added to it.
+    pub fn new(batches: Batches, density: Density) -> Result<VolumeEnergy, String> {
+        let energy = density.energy();
+        if density.barrier().is_some() {
+            return Err("a barrier beside the energy is not provided for high-order elements".to_string());
+        }
         if energy.variables() == Variables::SingularValues && !energy.is_barrier() {
             return Err(format!(
                 "the energy {:?} has no barrier against inversion; choose one that has, such as hencky",
@@ -94,7 +100,7 @@ impl VolumeEnergy {
         Ok(VolumeEnergy {
             list: batches.list(),
             batches,
-            energy,
+            density,
             processor: Processor::detect(),
             normalization: 1.0 / volume,
             offsets,
@@ -113,8 +119,8 @@ impl VolumeEnergy {
         self.batches.nodes
     }
 
-    pub fn energy(&self) -> &'static dyn Energy {
-        self.energy
+    pub fn energy(&self) -> &dyn Energy {
+        self.density.energy()
     }
 
     pub fn batches(&self) -> &Batches {
@@ -238,7 +244,7 @@ impl VolumeEnergy {
             &mut scratch.rooms,
         );
         let mut sums = [Lanes::ZERO, Lanes([f64::INFINITY; WIDTH])];
-        let by_invariants = self.energy.variables() == Variables::Invariants;
+        let by_invariants = self.energy().variables() == Variables::Invariants;
         for (chunk, weights) in group.weights.chunks(CHUNK).enumerate() {
             let start = 3 * CHUNK * chunk;
             let count = weights.len();
@@ -252,7 +258,7 @@ impl VolumeEnergy {
                 points,
                 least: &mut sums[1],
             });
-            self.energy
+            self.energy()
                 .slopes_in_lanes(self.processor, &points.variables[..count], &mut points.slopes[..count]);
             self.processor.run(Stresses {
                 raw: &mut raw,
@@ -268,7 +274,7 @@ impl VolumeEnergy {
             element.gather(self.processor, &scratch.jacobians, forces, &mut scratch.rooms);
         }
         let least_determinant = sums[1].0.iter().copied().fold(f64::INFINITY, f64::min);
-        let invalid = self.energy.is_barrier() && !(least_determinant > 0.0);
+        let invalid = self.energy().is_barrier() && !(least_determinant > 0.0);
         Evaluation {
             value: if invalid { f64::INFINITY } else { sums[0].0.iter().sum() },
             least_determinant: if sums[1].0.iter().any(|value| value.is_nan()) {

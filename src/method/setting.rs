@@ -70,6 +70,9 @@ pub fn fill(fields: &[Field], given: &Value) -> Map<String, Value> {
         let present = given.get(field.name);
         let value = match (&field.kind, &field.default, present) {
             (Kind::Table(inner), _, Some(value)) => Some(Value::Object(fill(inner, value))),
+            (Kind::List(Kind::Table(inner)), _, Some(Value::Array(items))) => {
+                Some(items.iter().map(|item| Value::Object(fill(inner, item))).collect())
+            }
             (_, _, Some(value)) => Some(value.clone()),
             (Kind::Table(inner), Default::Fields, None) => Some(Value::Object(fill(inner, &Value::Null))),
             (_, Default::Boolean(value), None) => Some(Value::from(*value)),

@@ -2,7 +2,8 @@
 //!
 //! Exactness for `n` points a direction: Gauss for every variable of a hexahedron up to degree `2n - 1`, and for total
 //! degree `2n - 1` in triangles and tetrahedra (collapsed Gauss-Jacobi points); Lobatto up to degree `2n - 3` a variable,
-//! with Gauss in triangles and tetrahedra; the trapezoid rule for linear functions, and for products of two of the
+//! but in triangles and tetrahedra, where it is Gauss with a tenth of the lattice's vertex rule, for linear functions only;
+//! the trapezoid rule for linear functions, and for products of two of the
 //! cosines `cos(j pi x)` with `j + k < 2 (n - 1)`.
 
 pub mod line;
@@ -35,14 +36,14 @@ pub enum Rule {
 /// Every rule with its meaning, the default first.
 pub const RULES: &[(&str, Rule, &str)] = &[
     (
+        "lobatto",
+        Rule::Lobatto,
+        "Gauss-Lobatto, with points on faces, edges and corners; Gauss and a tenth of a lattice in triangles and tetrahedra",
+    ),
+    (
         "gauss",
         Rule::Gauss,
         "Gauss-Legendre; collapsed Gauss-Jacobi in triangles and tetrahedra",
-    ),
-    (
-        "lobatto",
-        Rule::Lobatto,
-        "Gauss-Lobatto, with points on the faces; Gauss in triangles and tetrahedra",
     ),
     (
         "trapezoid",
@@ -77,7 +78,8 @@ impl Rule {
     /// The rule with `n` points a direction on a triangle.
     pub fn triangle(self, n: usize) -> Scattered<2> {
         match self {
-            Rule::Gauss | Rule::Lobatto => simplex::gauss_triangle(n),
+            Rule::Gauss => simplex::gauss_triangle(n),
+            Rule::Lobatto => simplex::mixed(simplex::gauss_triangle(n), simplex::lattice_triangle(n)),
             Rule::Trapezoid => simplex::lattice_triangle(n),
         }
     }
@@ -88,7 +90,8 @@ impl Rule {
             Shape::Hexahedron => CellQuadrature::Hexahedron(self.line(n)),
             Shape::Prism => CellQuadrature::Prism(self.triangle(n), self.line(n)),
             Shape::Tetrahedron => CellQuadrature::Tetrahedron(match self {
-                Rule::Gauss | Rule::Lobatto => simplex::gauss_tetrahedron(n),
+                Rule::Gauss => simplex::gauss_tetrahedron(n),
+                Rule::Lobatto => simplex::mixed(simplex::gauss_tetrahedron(n), simplex::lattice_tetrahedron(n)),
                 Rule::Trapezoid => simplex::lattice_tetrahedron(n),
             }),
         }

@@ -95,3 +95,12 @@ pub fn lattice_tetrahedron(n: usize) -> Scattered<3> {
         weights: shares.values().map(|share| share * step.powi(3) / 6.0).collect(),
     }
 }
+
+/// Nine tenths of one rule and a tenth of another, whose points a barrier is to guard.
+pub fn mixed<const N: usize>(main: Scattered<N>, guard: Scattered<N>) -> Scattered<N> {
+    let weights = main.weights.iter().map(|weight| 0.9 * weight);
+    Scattered {
+        weights: weights.chain(guard.weights.iter().map(|weight| 0.1 * weight)).collect(),
+        points: [main.points, guard.points].concat(),
+    }
+}

@@ -82,6 +82,20 @@ impl Heights {
         std::array::from_fn(|k| group[k].0[index % WIDTH])
     }
 
+    /// Whether function `i` is lowest in the middle of a polygon. A polygon that was cut by some of the functions only may
+    /// belong to one that is nowhere lowest.
+    #[inline(always)]
+    pub(super) fn owns<V: Vector>(&self, polygon: &[Corner], i: usize, tolerance: f64) -> bool {
+        let share = 1.0 / polygon.len() as f64;
+        let (mut u, mut v) = (0.0, 0.0);
+        for corner in polygon {
+            u += share * corner.u;
+            v += share * corner.v;
+        }
+        let [a, b, c] = self.get(i);
+        self.lowest::<V>(u, v).0 >= a * u + b * v + c - tolerance
+    }
+
     /// The smallest value at a point, and the first function that takes it.
     #[inline(always)]
     pub(super) fn lowest<V: Vector>(&self, u: f64, v: f64) -> (f64, usize) {

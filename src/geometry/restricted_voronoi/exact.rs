@@ -45,7 +45,7 @@ fn sign(own: [f64; 3], x: [f64; 3], entering: Mark, leaving: Mark, duals: &dyn F
         (false, false) => {
             // The differences to the two rivals turn counter-clockwise, as the edges do, so that the denominator of the
             // vertex is positive.
-            orient3d(space(duals(entering)), space(duals(leaving)), space(x), space(own)) * -1.0
+            -orient3d(space(duals(entering)), space(duals(leaving)), space(x), space(own))
         }
         (on_edge, _) => {
             // On edge k the parameter runs from corner k to k + 1. Leaving along the edge, the cell lies ahead.

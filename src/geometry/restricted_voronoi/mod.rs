@@ -133,7 +133,7 @@ pub struct RestrictedVoronoi {
     /// The site nearest to the vertex at the same place of `vertex_order`, and then to every vertex.
     ordered: Vec<u32>,
     nearest: Vec<u32>,
-    pool: Mutex<Vec<Box<Scratch>>>,
+    pool: Mutex<Vec<Scratch>>,
 }
 
 impl RestrictedVoronoi {
@@ -263,7 +263,7 @@ impl RestrictedVoronoi {
         true
     }
 
-    fn take(&self) -> Box<Scratch> {
+    fn take(&self) -> Scratch {
         self.pool
             .lock()
             .ok()
@@ -271,7 +271,7 @@ impl RestrictedVoronoi {
             .unwrap_or_default()
     }
 
-    fn give(&self, scratch: Box<Scratch>) {
+    fn give(&self, scratch: Scratch) {
         if let Ok(mut pool) = self.pool.lock() {
             pool.push(scratch);
         }
@@ -449,7 +449,7 @@ impl RestrictedVoronoi {
                     }
                     let start = Clipper::corners::<V>(&frame, some_heights);
                     let polygon = clipper.cell::<V>(&start, some_heights, 0, tolerance);
-                    if polygon.len() >= 3 {
+                    if polygon.len() >= 3 && heights.owns::<V>(polygon, owner, tolerance) {
                         polygons.push_renamed(owner, polygon, rivals);
                     }
                 }
@@ -480,7 +480,7 @@ impl RestrictedVoronoi {
                         }
                     }
                     let polygon = exact.cell(&frame, duals, owner, rivals);
-                    if polygon.len() >= 3 {
+                    if polygon.len() >= 3 && (few || heights.owns::<V>(polygon, owner, tolerance)) {
                         polygons.push(owner, polygon);
                     }
                 }

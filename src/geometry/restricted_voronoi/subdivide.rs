@@ -2,7 +2,8 @@
 //!
 //! The triangle is divided into four again and again, until few functions can be lowest on a part: a function that is
 //! nowhere lower than another at the part's corners is not lowest on it. Two functions whose cells share an edge meet in a
-//! part where both remain, so the functions that remain together anywhere are all that need to be cut with each other.
+//! part where both remain, so the functions that remain together anywhere are all that need to be cut with each other. A
+//! function that remains without being lowest anywhere is told by its polygon's middle, where another one is lower.
 
 use super::clip::Heights;
 use super::frame::Frame;

@@ -14,6 +14,7 @@ mod text;
 
 mod gmsh;
 mod medit;
+mod mfem;
 mod obj;
 mod off;
 mod ply;
@@ -85,6 +86,7 @@ pub struct Written {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
     Medit,
+    Mfem,
     Gmsh,
     /// Version 2.2, for programs that do not know 4.1.
     Gmsh2,
@@ -122,6 +124,16 @@ pub const FORMATS: &[Entry] = &[
         sniff: medit::sniff,
         read: medit::read,
         write: medit::write,
+    },
+    Entry {
+        format: Format::Mfem,
+        name: "MFEM",
+        extensions: &["mfem"],
+        cells: &CellKind::ALL,
+        doc: "text, straight cells; attributes are kept as the field `reference`",
+        sniff: mfem::sniff,
+        read: mfem::read,
+        write: mfem::write,
     },
     Entry {
         format: Format::Gmsh,
@@ -392,12 +404,6 @@ fn check_fields(of: &str, fields: &[Field], rows: usize) -> Result<(), String> {
 
 /// Formats that are told from ours, so that the message can name them.
 fn recognised_only(bytes: &[u8]) -> Option<&'static str> {
-    if bytes.starts_with(b"MFEM ") {
-        return Some(
-            "this is a mesh in MFEM's own text format, not MEDIT; convert it with MFEM (`Mesh::PrintVTU`, or `mesh-explorer` and its \
-             VTK output) and pass the .vtu or .vtk file",
-        );
-    }
     if bytes.starts_with(&[1, 0, 0, 0]) && matches!(bytes.get(4..8), Some([1..=4, 0, 0, 0])) {
         return Some("this is a binary MEDIT file (.meshb); convert it to the ASCII form (.mesh)");
     }

@@ -39,6 +39,11 @@ fn along(patch: &Patch, side: usize, places: &[Place; SAMPLES], visit: &mut dyn 
     }
 }
 
+/// The larger of two numbers; not-a-number, from a patch without normal, must show.
+fn larger(a: f64, b: f64) -> f64 {
+    if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) }
+}
+
 /// Measures all edges.
 pub fn measure(patches: &[Patch], connectivity: &Connectivity) -> Continuity {
     let places: [Place; SAMPLES] = std::array::from_fn(|index| Place::new(index as f64 / (SAMPLES - 1) as f64));
@@ -59,11 +64,16 @@ pub fn measure(patches: &[Patch], connectivity: &Connectivity) -> Continuity {
             let (quad, side) = quad_and_corner(second);
             along(&patches[quad], side, &places, &mut |index, position, area| {
                 let (other, other_area) = one[SAMPLES - 1 - index];
-                found[0] = found[0].max(length(subtract(position, other)));
-                let angle = length(cross(area, other_area))
-                    .atan2(dot(area, other_area))
-                    .to_degrees();
-                found[1] = found[1].max(angle);
+                found[0] = larger(found[0], length(subtract(position, other)));
+                let (sine, cosine) = (length(cross(area, other_area)), dot(area, other_area));
+                // Without a normal on either side both are zero.
+                let defined = sine > 0.0 || cosine != 0.0;
+                let angle = if defined {
+                    sine.atan2(cosine).to_degrees()
+                } else {
+                    f64::NAN
+                };
+                found[1] = larger(found[1], angle);
                 found[2] += angle * angle;
             });
             found
@@ -75,13 +85,8 @@ pub fn measure(patches: &[Patch], connectivity: &Connectivity) -> Continuity {
     };
     let mut squares = 0.0;
     for [gap, largest, sum] in &edges {
-        // Not-a-number, from a patch without normal, must show.
-        total.gap = if gap.is_nan() { f64::NAN } else { total.gap.max(*gap) };
-        total.largest = if largest.is_nan() {
-            f64::NAN
-        } else {
-            total.largest.max(*largest)
-        };
+        total.gap = larger(total.gap, *gap);
+        total.largest = larger(total.largest, *largest);
         squares += sum;
     }
     let inner = connectivity.edges.len() - connectivity.boundary_edges();

@@ -38,7 +38,7 @@ fn equations(network: &Network) -> Vec<Equation> {
     for (edge, &[t1, t2]) in network.tangents.iter().enumerate() {
         let [a, b] = network.connectivity.edges[edge].map(|vertex| vertex as usize);
         let (first, second) = (2 * edge, 2 * edge + 1);
-        let bends = [(a, 0), (b, 1)].map(|(vertex, _)| network.spoke(edge as u32, vertex).bend);
+        let bends = [a, b].map(|vertex| network.spoke(edge as u32, vertex).bend);
         all.push(Equation {
             ends: [(first, t1), (second, [0.0; 3])],
             rhs: -bends[0],

@@ -400,7 +400,7 @@ pub fn run(problem: &Problem, settings: &Settings, observer: &mut dyn Observer) 
         metrics.insert("gradient_error".to_string(), solved.gradient_error);
         metrics.insert("unknowns".to_string(), solved.unknowns as f64);
     }
-    let mut solid = None;
+    let mut other = (settings.result == "control-points").then(|| outcome::control_nets(&built.patches));
     if let Some(shell) = settings.shell() {
         observer.phase("hexahedra");
         let found = hexahedra::build(problem, &built.patches, shell, settings.layers as usize, observer)
@@ -420,9 +420,9 @@ pub fn run(problem: &Problem, settings: &Settings, observer: &mut dyn Observer) 
             metrics.insert(name.to_string(), value);
         }
         let pieces = outcome::pieces(settings, found.cells.len()).min(6);
-        solid = Some(hexahedra::tessellate(&found, pieces));
+        other = other.or_else(|| Some(hexahedra::tessellate(&found, pieces)));
     }
-    let mesh = solid.unwrap_or_else(|| {
+    let mesh = other.unwrap_or_else(|| {
         outcome::tessellate(
             &built.patches,
             &problem.connectivity,

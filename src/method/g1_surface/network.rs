@@ -10,7 +10,7 @@
 use super::hermite;
 use crate::linalg::vector3::{add, cross, dot, subtract, times};
 use crate::mesh::length;
-use crate::mesh::quadrilateral::{Connectivity, QuadrilateralMesh, quad_and_corner};
+use crate::mesh::quadrilateral::{Connectivity, QuadrilateralMesh};
 
 /// The natural cubic over one edge.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -255,14 +255,5 @@ impl Network {
             (at(0.0) + 4.0 * at(0.5) + at(1.0)) / 6.0
         };
         (0..self.tangents.len()).map(edge_energy).sum()
-    }
-
-    /// The corners of quads as pairs of spokes: visits `(vertex, corner index within the star, quad, corner of the quad)`.
-    pub fn corners(&self, vertex: usize) -> impl Iterator<Item = (usize, usize)> {
-        self.connectivity
-            .stars
-            .row(vertex)
-            .iter()
-            .map(|&corner| quad_and_corner(corner))
     }
 }

@@ -218,6 +218,31 @@ pub fn tessellate(
     )
 }
 
+/// The control nets of all patches as a VTU file: 25 points a patch, `5 i + j` for `B_i(u) B_j(v)` of degree 4, and 16 quads.
+pub fn control_nets(patches: &[Patch]) -> Vec<u8> {
+    let points: Vec<[f64; 3]> = patches.iter().flat_map(surface::control_points).collect();
+    let mut cells = Vec::with_capacity(16 * patches.len());
+    let mut numbers = Vec::with_capacity(16 * patches.len());
+    for index in 0..patches.len() {
+        for i in 0..4 {
+            for j in 0..4 {
+                let corners = [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)];
+                cells.push(corners.map(|(i, j)| (25 * index + 5 * i + j) as u32));
+                numbers.push(index as f64);
+            }
+        }
+    }
+    vtu::write(
+        &points,
+        Cells {
+            quads: &cells,
+            ..Cells::default()
+        },
+        &[],
+        &[("patch", 1, &numbers)],
+    )
+}
+
 /// The mean length of the chords of the edges.
 pub fn mean_edge(problem: &Problem) -> f64 {
     let edges = &problem.connectivity.edges;

@@ -3,9 +3,9 @@
 use super::hexahedra::Shell;
 use super::patch::{Operator, Reference, Solve};
 use crate::method::Failure;
-use crate::method::setting::{Default, Field, Kind};
+use crate::method::setting::{Default, Field, Kind, fill};
 use serde::{Deserialize, Serialize};
-use serde_json::{Map, Value};
+use serde_json::Value;
 
 /// Everything that `[settings]` may hold.
 pub static FIELDS: &[Field] = &[
@@ -148,6 +148,21 @@ pub static FIELDS: &[Field] = &[
         doc: "The operator whose square is least over the middle node. Preset best: laplacian, paper: printed.",
     },
     Field {
+        name: "result",
+        kind: Kind::Choice(&[
+            (
+                "tessellation",
+                "quadrilaterals on the patches, with angles, curvatures and isophotes as fields",
+            ),
+            (
+                "control-points",
+                "the nets of 5 by 5 Bezier control points of every patch, 25 points a patch in order; no picture of the surface",
+            ),
+        ]),
+        default: Default::Text("tessellation"),
+        doc: "What the result's mesh holds.",
+    },
+    Field {
         name: "tessellation",
         kind: Kind::Integer { min: 1, max: 64 },
         default: Default::Absent,
@@ -250,6 +265,7 @@ pub struct Settings {
     pub patch_tolerance: f64,
     pub reference: String,
     pub operator: String,
+    pub result: String,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tessellation: Option<u64>,
     pub stripes: f64,
@@ -354,6 +370,9 @@ impl Settings {
         if self.shell().is_none() {
             drop(&["sphere_ratio", "layers"]);
         }
+        if self.result == "control-points" {
+            drop(&["tessellation", "stripes"]);
+        }
         if self.tangents == Tangents::Balanced {
             drop(&["edge_normals", "rank_tolerance"]);
         } else if !self.repair {
@@ -367,28 +386,6 @@ impl Settings {
         }
         Value::Object(table)
     }
-}
-
-/// The given table with declared defaults where it is silent.
-fn fill(fields: &[Field], given: &Value) -> Map<String, Value> {
-    let mut table = Map::new();
-    for field in fields {
-        let value = match (&field.kind, given.get(field.name)) {
-            (Kind::Table(inner), given) => Some(Value::Object(fill(inner, given.unwrap_or(&Value::Null)))),
-            (_, Some(value)) => Some(value.clone()),
-            (_, None) => match &field.default {
-                Default::Boolean(value) => Some(Value::from(*value)),
-                Default::Integer(value) => Some(Value::from(*value)),
-                Default::Number(value) => Some(Value::from(*value)),
-                Default::Text(value) => Some(Value::from(*value)),
-                Default::Required | Default::Absent | Default::Fields => None,
-            },
-        };
-        if let Some(value) = value {
-            table.insert(field.name.to_string(), value);
-        }
-    }
-    table
 }
 
 /// Checks that go across fields: path of the offending field and message.

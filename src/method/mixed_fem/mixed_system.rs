@@ -66,8 +66,9 @@ pub struct Numbering {
     scale: [f64; 3],
 }
 
-/// The fields in the order in which a vertex's unknowns are numbered.
-const FIELDS: [usize; 3] = [1, 0, 2];
+/// The fields in the order in which a vertex's unknowns are numbered: `v`, `w`, `u`. In this order every pivot is nonzero once
+/// those before it are eliminated, even where a vertex is split over supernodes.
+const FIELDS: [usize; 3] = [1, 2, 0];
 
 impl Numbering {
     pub fn new(discretization: &Discretization<'_>) -> Self {

@@ -3,9 +3,9 @@
 use super::function::FUNCTIONS;
 use super::scheme::{Mass, Scheme};
 use crate::method::Failure;
-use crate::method::setting::{Default, Field, Kind};
+use crate::method::setting::{Default, Field, Kind, fill};
 use serde::{Deserialize, Serialize};
-use serde_json::{Map, Value};
+use serde_json::Value;
 
 /// Everything that `[settings]` may hold.
 pub static FIELDS: &[Field] = &[
@@ -580,28 +580,6 @@ impl Settings {
         table.retain(|_, value| !value.is_null());
         Value::Object(table)
     }
-}
-
-/// The given table with declared defaults where it is silent, recursively.
-fn fill(fields: &[Field], given: &Value) -> Map<String, Value> {
-    let mut table = Map::new();
-    for field in fields {
-        let value = match (&field.kind, &field.default, given.get(field.name)) {
-            (Kind::Table(inner), _, Some(value)) => Value::Object(fill(inner, value)),
-            (Kind::List(Kind::Table(inner)), _, Some(Value::Array(items))) => {
-                items.iter().map(|item| Value::Object(fill(inner, item))).collect()
-            }
-            (_, _, Some(value)) => value.clone(),
-            (Kind::Table(inner), Default::Fields, None) => Value::Object(fill(inner, &Value::Null)),
-            (_, Default::Boolean(value), None) => Value::from(*value),
-            (_, Default::Integer(value), None) => Value::from(*value),
-            (_, Default::Number(value), None) => Value::from(*value),
-            (_, Default::Text(value), None) => Value::from(*value),
-            _ => continue,
-        };
-        table.insert(field.name.to_string(), value);
-    }
-    table
 }
 
 /// Checks that go across fields: path of the offending field and message.

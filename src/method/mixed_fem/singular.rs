@@ -12,7 +12,7 @@ use super::domain::{Domain, Place};
 pub struct Singular {
     /// Boundary vertices whose only free neighbour is that of an earlier one: `(earlier, later, neighbour)`.
     pub pairs: Vec<(u32, u32, u32)>,
-    /// Boundary vertices with free neighbours, and these neighbours.
+    /// Boundary vertices, each with a row, and their free neighbours.
     pub rows: usize,
     pub ring: usize,
     /// Rows that no matching reaches, rows without any unknown included.
@@ -40,7 +40,7 @@ pub fn find(domain: &Domain<'_>) -> Singular {
             .copied()
             .filter(|&v| free(v))
             .collect();
-        found.rows += usize::from(!inner.is_empty());
+        found.rows += 1;
         for &other in &inner {
             reached[other as usize] = true;
         }

@@ -251,7 +251,7 @@ fn isophotes(mesh: &TriangleMesh, normals: &[[f64; 3]]) -> Vec<f64> {
                 cell.iter().map(|&vertex| normals[vertex as usize][axis]).sum::<f64>() / 3.0
             });
             let brightness = dot(mean, LIGHT) / length(mean).max(f64::MIN_POSITIVE);
-            0.5 + 0.5 * (std::f64::consts::TAU * WAVES * 0.5 * brightness).cos()
+            (std::f64::consts::PI * WAVES * brightness).cos()
         })
         .collect()
 }

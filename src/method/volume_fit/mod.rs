@@ -19,13 +19,15 @@ pub mod settings;
 pub mod surface_energy;
 pub mod target;
 pub mod template;
+pub mod untangle;
 
 use super::model::ModelKind;
 use super::setting::Field;
 use super::{Failure, Inputs, Method, Outcome, Traces};
+use crate::energy::mapping::Density;
 use crate::fem::batches::{Batches, references_of_volume};
 use crate::fem::boundary::Boundary;
-use crate::fem::space::Space;
+use crate::fem::space::{Kind, Space};
 use crate::fem::volume_energy::VolumeEnergy;
 use crate::linalg::vector3::Columns;
 use crate::mesh::mixed::{MixedMesh, Topology};
@@ -165,13 +167,19 @@ struct Fit<'a> {
     lambda: f64,
     increases: usize,
     stages: usize,
+    /// Quadrature points added a direction, after elements came out invalid between the points.
+    extra_points: usize,
 }
+
+/// Share of the least determinant that a step must leave.
+const LEAST_SHARE: f64 = 0.2;
 
 /// Tells the world and remembers.
 struct Recorder<'a> {
     observer: &'a mut dyn Observer,
     rows: &'a mut Vec<[f64; 10]>,
     latest: Rc<Cell<Parts>>,
+    floor: Rc<Cell<f64>>,
     /// Accepted steps before this minimization, and whether its start is already recorded.
     before: u64,
     skip_start: bool,
@@ -188,6 +196,7 @@ impl Observer for Recorder<'_> {
     }
 
     fn iterate(&mut self, iterate: &Iterate) {
+        self.floor.set(LEAST_SHARE * self.latest.get().least_determinant);
         if iterate.iteration == 0 && self.skip_start {
             return;
         }
@@ -291,6 +300,7 @@ impl<'a> Fit<'a> {
             lambda: settings.stages[0].lambda,
             increases: 0,
             stages: 0,
+            extra_points: 0,
         })
     }
 
@@ -299,13 +309,16 @@ impl<'a> Fit<'a> {
     }
 
     fn volume_energy(&self, space: &Space) -> Result<VolumeEnergy, Failure> {
-        let quadrature = |kind: crate::fem::space::Kind| {
-            self.settings
-                .rule
-                .cell(kind.shape, self.settings.quadrature_points(kind.order))
+        self.volume_energy_of(space, Density::new(self.settings.energy))
+    }
+
+    fn volume_energy_of(&self, space: &Space, density: Density) -> Result<VolumeEnergy, Failure> {
+        let quadrature = |kind: Kind| {
+            let points = self.settings.quadrature_points(kind.order) + self.extra_points;
+            self.settings.rule.cell(kind.shape, points)
         };
         let batches = Batches::new(space, &self.references, &quadrature).map_err(invalid)?;
-        VolumeEnergy::new(batches, self.settings.energy).map_err(invalid)
+        VolumeEnergy::new(batches, density).map_err(invalid)
     }
 
     /// Intervals between samples along an edge of the boundary.
@@ -335,7 +348,18 @@ impl<'a> Fit<'a> {
         let quality = outcome::quality(&self.space, &self.references, &self.x)?;
         let inverted_at_start = quality.least_determinant.iter().filter(|det| !(**det > 0.0)).count();
         drop(start);
-        if !evaluation.value.is_finite() {
+        let mut stop = StopReason::Converged;
+        let mut reason = String::new();
+        if !evaluation.value.is_finite() && self.settings.untangle {
+            if let Some(interrupted) = untangle::untangle(self, observer)? {
+                return self.finish(
+                    interrupted,
+                    "stopped from outside while the template was untangled".to_string(),
+                    inverted_at_start,
+                    observer,
+                );
+            }
+        } else if !evaluation.value.is_finite() {
             return Err(Failure {
                 kind: "invalid-start".to_string(),
                 reason: format!(
@@ -345,8 +369,6 @@ impl<'a> Fit<'a> {
                 ),
             });
         }
-        let mut stop = StopReason::Converged;
-        let mut reason = String::new();
         let stages = self.settings.stages.clone();
         for stage in stages {
             let orders: Vec<usize> = self.space.orders.iter().map(|&order| order.max(stage.order)).collect();
@@ -374,6 +396,34 @@ impl<'a> Fit<'a> {
                 }
             }
         }
+        for _ in 0..self.settings.repairs {
+            if interrupted(stop) {
+                break;
+            }
+            observer.phase("certify");
+            let certificates = outcome::certify(&self.space, &self.references, &self.x, observer);
+            let failing = certificates
+                .verdicts
+                .iter()
+                .filter(|verdict| **verdict == outcome::Judged::Fails)
+                .count();
+            if failing == 0 {
+                break;
+            }
+            self.extra_points += 3;
+            self.notices.push(format!(
+                "{failing} elements were invalid between quadrature points; gone on with {} more a direction",
+                self.extra_points
+            ));
+            if !self.volume_energy(&self.space)?.value(&self.x).value.is_finite()
+                && let Some(interrupted) = untangle::untangle(self, observer)?
+            {
+                (stop, reason) = (interrupted, "stopped from outside during a repair".to_string());
+                break;
+            }
+            let last = self.settings.stages[self.settings.stages.len() - 1];
+            (stop, reason) = self.stage(&last, observer)?;
+        }
         self.finish(stop, reason, inverted_at_start, observer)
     }
 
@@ -384,6 +434,13 @@ impl<'a> Fit<'a> {
         self.lambda = stage.lambda;
         let order = self.space.orders.iter().copied().max().unwrap_or(1);
         let volume = self.volume_energy(&self.space)?;
+        if !volume.value(&self.x).value.is_finite()
+            && settings.untangle
+            && let Some(stop) = untangle::untangle(self, observer)?
+        {
+            // More points than in the stage before found an inversion.
+            return Ok((stop, "stopped from outside while elements were untangled".to_string()));
+        }
         let boundary = Boundary::new(&self.volume, &self.topology, &self.space, self.intervals(order));
         let mut samples = Vec::new();
         boundary.positions(&self.x, &mut samples);
@@ -401,9 +458,12 @@ impl<'a> Fit<'a> {
             None
         };
         let latest = Rc::new(Cell::new(Parts::default()));
+        let floor = Rc::new(Cell::new(f64::NEG_INFINITY));
         let factor = surface.as_ref().map_or(0.0, SurfaceEnergy::factor);
         let mut done = 0;
         let mut previous = f64::INFINITY;
+        // The energy when a round last ended for its small change.
+        let mut settled = f64::INFINITY;
         let outcome = loop {
             let preconditioner = if settings.preconditioned {
                 boundary.positions(&self.x, &mut samples);
@@ -438,6 +498,7 @@ impl<'a> Fit<'a> {
                 lambda: stage.lambda,
                 preconditioner,
                 latest: latest.clone(),
+                floor: floor.clone(),
                 samples: Vec::new(),
                 forces: Vec::new(),
                 room: Vec::new(),
@@ -456,6 +517,7 @@ impl<'a> Fit<'a> {
             let mut recorder = Recorder {
                 observer,
                 latest: latest.clone(),
+                floor: floor.clone(),
                 before: self.counters["iterations"],
                 skip_start: done > 0,
                 stage: self.stages,
@@ -471,7 +533,17 @@ impl<'a> Fit<'a> {
             done += solution.counters.iterations;
             self.count("iterations", solution.counters.iterations);
             self.count("evaluations", solution.counters.evaluations);
-            let more = solution.stop == StopReason::StepLimit && done < stage.iterations;
+            // A step cut short by the barrier changes little as well: only when a fresh start finds nothing either has the
+            // stage converged.
+            let by_change =
+                solution.stop == StopReason::Converged && solution.gradient_norm >= settings.gradient_tolerance;
+            let again = by_change
+                && solution.counters.iterations > 0
+                && settled - solution.value > 5.0 * settings.change_tolerance * solution.value.abs();
+            if again {
+                settled = solution.value;
+            }
+            let more = (solution.stop == StopReason::StepLimit || again) && done < stage.iterations;
             if !more {
                 // The parts at the accepted point, not at the last one tried.
                 let mut gradient = vec![0.0; self.x.len()];
@@ -510,7 +582,7 @@ impl<'a> Fit<'a> {
         )?;
         let cells = self.volume.cells();
         let flags: Vec<bool> = quality.least_determinant.iter().map(|det| !(*det > 0.0)).collect();
-        let certificates = outcome::certify(&self.volume, &self.space, &self.references, &self.x, observer);
+        let certificates = outcome::certify(&self.space, &self.references, &self.x, observer);
         let mut set = |name: &str, value: f64| {
             metrics.insert(name.to_string(), value);
         };

@@ -24,6 +24,9 @@ pub struct FitObjective<'a> {
     pub lambda: f64,
     pub preconditioner: Option<Preconditioner>,
     pub latest: Rc<Cell<Parts>>,
+    /// Determinants below this count as outside the domain: one step may not crush an element at once, or the next ones
+    /// have nowhere to go.
+    pub floor: Rc<Cell<f64>>,
     pub samples: Vec<[f64; 3]>,
     pub forces: Vec<[f64; 3]>,
     pub room: Vec<f64>,
@@ -45,7 +48,7 @@ impl Objective for FitObjective<'_> {
     fn gradient(&mut self, x: &[f64], gradient: &mut [f64]) -> f64 {
         gradient.fill(0.0);
         let volume = self.volume.add_gradient(x, self.lambda, gradient);
-        if !volume.value.is_finite() {
+        if !volume.value.is_finite() || volume.least_determinant < self.floor.get() {
             // The surface does not matter where a cell is inverted.
             return f64::INFINITY;
         }

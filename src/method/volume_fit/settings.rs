@@ -59,7 +59,7 @@ pub static FIELDS: &[Field] = &[
     Field {
         name: "preset",
         kind: Kind::Choice(&[
-            ("best", "integrated Legendre, Gauss quadrature, preconditioned L-BFGS"),
+            ("best", "integrated Legendre, Lobatto quadrature, preconditioned L-BFGS"),
             (
                 "paper",
                 "integrated Fourier, trapezoid rule, plain L-BFGS until the gradient norm is 1e-8",
@@ -142,14 +142,15 @@ pub static FIELDS: &[Field] = &[
         name: "quadrature",
         kind: Kind::Named(rule_names),
         default: Default::Absent,
-        doc: "Rule for the volume energy. Preset best: gauss, paper: trapezoid.",
+        doc: "Rule for the volume energy. Preset best: lobatto, whose points on corners and edges keep these valid; paper: \
+              trapezoid.",
     },
     Field {
         name: "quadrature_points",
         kind: Kind::OneOf(&[
             Kind::Choice(&[(
                 "auto",
-                "Gauss: order + 2 for polynomials, 2 order else, 3 at least; Lobatto and trapezoid: 2 order - 1",
+                "Gauss and Lobatto: order + 2 and order + 3 for polynomials, 2 order else, 3 at least; trapezoid: 2 order - 1",
             )]),
             Kind::Integer { min: 2, max: 40 },
         ]),
@@ -232,14 +233,21 @@ pub static FIELDS: &[Field] = &[
         name: "change_tolerance",
         kind: Kind::Number { min: 0.0, max: 1.0 },
         default: Default::Absent,
-        doc: "A stage has converged when an iteration lowers the energy by less than this share. Preset best: 1e-4, paper: 0.",
+        doc: "A stage has converged when an iteration lowers the energy by less than this share. Preset best: 1e-5, paper: 0.",
     },
     Field {
-        name: "optimize_start",
+        name: "untangle",
         kind: Kind::Boolean,
         default: Default::Boolean(true),
-        doc: "Untangle a template with inverted elements before fitting, by a regularized energy with a free boundary kept \
-              close. Otherwise such a template is refused.",
+        doc: "Untangle a template with inverted elements before fitting, by a regularized energy beside the surface energy. \
+              Otherwise such a template is refused.",
+    },
+    Field {
+        name: "repairs",
+        kind: Kind::Integer { min: 0, max: 10 },
+        default: Default::Absent,
+        doc: "How often, at most, a fit with elements that are invalid between quadrature points is gone on with, with more \
+              points. Preset best: 3, paper: 0.",
     },
 ];
 
@@ -277,6 +285,7 @@ pub struct Settings {
     pub gradient_tolerance: f64,
     pub change_tolerance: f64,
     pub untangle: bool,
+    pub repairs: usize,
 }
 
 /// Raising single orders.
@@ -297,7 +306,7 @@ fn invalid(reason: String) -> Failure {
 /// What the presets choose: field, best, paper.
 const PRESETS: &[(&str, &str, &str)] = &[
     ("basis", "integrated-legendre", "integrated-fourier"),
-    ("quadrature", "gauss", "trapezoid"),
+    ("quadrature", "lobatto", "trapezoid"),
     ("solver", "preconditioned-l-bfgs", "l-bfgs"),
 ];
 
@@ -439,8 +448,9 @@ impl Settings {
             change_tolerance: settings
                 .get("change_tolerance")
                 .and_then(Value::as_f64)
-                .unwrap_or(if paper { 0.0 } else { 1e-4 }),
-            untangle: flag("optimize_start"),
+                .unwrap_or(if paper { 0.0 } else { 1e-5 }),
+            untangle: flag("untangle"),
+            repairs: whole("repairs").unwrap_or(if paper { 0 } else { 3 }),
         })
     }
 
@@ -448,8 +458,9 @@ impl Settings {
     pub fn quadrature_points(&self, order: usize) -> usize {
         self.points.unwrap_or(match self.rule {
             Rule::Gauss if self.basis.is_polynomial() => (order + 2).max(3),
-            Rule::Gauss => (2 * order).max(3),
-            Rule::Lobatto | Rule::Trapezoid => (2 * order - 1).max(2),
+            Rule::Lobatto if self.basis.is_polynomial() => order + 3,
+            Rule::Gauss | Rule::Lobatto => (2 * order).max(3),
+            Rule::Trapezoid => (2 * order - 1).max(2),
         })
     }
 }

@@ -1,0 +1,124 @@
+//! Turning inverted elements before the barrier takes over, by a falling regularization of the determinant (Garanzha et
+//! al. 2021), beside the surface energy that holds the boundary.
+//!
+//! Success is judged at the quadrature points. Not guaranteed: success.
+
+use super::objective::{FitObjective, Parts};
+use super::surface_energy::SurfaceEnergy;
+use super::{Fit, invalid};
+use crate::energy::mapping::Density;
+use crate::energy::untangling::Untangling;
+use crate::fem::boundary::Boundary;
+use crate::method::Failure;
+use crate::optimize::lbfgs::Lbfgs;
+use crate::optimize::{Iterate, Observer, StopReason, Stopping};
+use std::cell::Cell;
+use std::rc::Rc;
+
+/// Values of the regularization at most, and iterations with each.
+const ROUNDS: usize = 60;
+const ITERATIONS: u64 = 60;
+/// Least share by which the regularized determinant falls from round to round.
+const DECREASE: f64 = 0.1;
+
+/// Passes on the wish to stop, and nothing else.
+struct Quiet<'a>(&'a mut dyn Observer);
+
+impl Observer for Quiet<'_> {
+    fn phase(&mut self, _name: &str) {}
+    fn iterate(&mut self, _iterate: &Iterate) {}
+    fn stop(&self) -> Option<StopReason> {
+        self.0.stop()
+    }
+}
+
+/// Moves the nodes until all determinants at quadrature points are positive. `Some` when the observer asked to stop.
+///
+/// # Errors
+/// `tangled` when elements stay inverted.
+pub(super) fn untangle(fit: &mut Fit<'_>, observer: &mut dyn Observer) -> Result<Option<StopReason>, Failure> {
+    observer.phase("untangle");
+    let order = fit.space.orders.iter().copied().max().unwrap_or(1);
+    let boundary = Boundary::new(&fit.volume, &fit.topology, &fit.space, fit.intervals(order));
+    let mut samples = Vec::new();
+    boundary.positions(&fit.x, &mut samples);
+    let terms = fit.settings.terms;
+    let mut surface = None;
+    if terms.to_target || terms.from_target {
+        let energy = SurfaceEnergy::new(
+            &samples,
+            &boundary.triangles,
+            &fit.target,
+            terms,
+            fit.settings.anisotropy,
+            fit.scale,
+        );
+        surface = Some(energy.map_err(invalid)?);
+    }
+    let mut regularization = Untangling {
+        epsilon: 1.0,
+        lambda: 1.0,
+    };
+    let mut least = fit.volume_energy(&fit.space)?.value(&fit.x).least_determinant;
+    for _ in 0..ROUNDS {
+        if least > 0.0 {
+            return Ok(None);
+        }
+        let volume = fit.volume_energy_of(&fit.space, Density::of(regularization))?;
+        let latest = Rc::new(Cell::new(Parts::default()));
+        let mut objective = FitObjective {
+            volume: &volume,
+            boundary: &boundary,
+            surface: surface.as_mut(),
+            lambda: 0.05,
+            preconditioner: None,
+            latest: latest.clone(),
+            floor: Rc::new(Cell::new(f64::NEG_INFINITY)),
+            samples: Vec::new(),
+            forces: Vec::new(),
+            room: Vec::new(),
+        };
+        let lbfgs = Lbfgs {
+            stopping: Stopping {
+                gradient_norm: 1e-10,
+                relative_decrement: 0.0,
+                relative_change: 1e-4,
+                iterations: ITERATIONS,
+                ..Stopping::default()
+            },
+            ..Lbfgs::default()
+        };
+        let before = volume.value(&fit.x).value;
+        let solution = lbfgs.minimize(&mut objective, std::mem::take(&mut fit.x), &mut Quiet(observer));
+        fit.x = solution.x;
+        fit.count("iterations", solution.counters.iterations);
+        fit.count("evaluations", solution.counters.evaluations);
+        if let Some(stop) = observer.stop() {
+            return Ok(Some(stop));
+        }
+        let after = volume.value(&fit.x);
+        least = after.least_determinant;
+        // The next epsilon: the least determinant is to look worse by a share.
+        let fall = (1.0 - after.value / before).clamp(DECREASE, 0.9);
+        let wanted = (1.0 - fall) * regularization.chi(least);
+        let square = 4.0 * wanted * (wanted - least);
+        regularization.epsilon = if square > 0.0 {
+            square.sqrt().min(0.9 * regularization.epsilon)
+        } else {
+            0.5 * regularization.epsilon
+        };
+        if !(regularization.epsilon > 1e-12) {
+            break;
+        }
+    }
+    if least > 0.0 {
+        return Ok(None);
+    }
+    Err(Failure {
+        kind: "tangled".to_string(),
+        reason: format!(
+            "elements stay inverted: the least determinant at a quadrature point is {least:.3e} after untangling; use a \
+             better template, more elements, or a larger lambda"
+        ),
+    })
+}

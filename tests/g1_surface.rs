@@ -1,0 +1,459 @@
+//! G1 surfaces against stored figures of an independent program, and the promises of the method.
+
+use serde_json::{Value, json};
+use vargeo::fem::bernstein_hexahedron::{self as bernstein, ControlPoints, Verdict};
+use vargeo::linalg::vector3::{dot, subtract};
+use vargeo::mesh::generate::surface::{generate_surface, surfaces};
+use vargeo::mesh::quadrilateral::{Connectivity, QuadrilateralMesh};
+use vargeo::method::g1_surface::network::{Network, natural};
+use vargeo::method::g1_surface::patch::{Operator, Patch, Reference, Solve, fit};
+use vargeo::method::g1_surface::{
+    G1Surface, balance, continuity, edge_normals, enclosure, hermite, laplace_beltrami, least_squares, patch, surface,
+};
+use vargeo::method::model::{LoadedModel, Part};
+use vargeo::method::{Failure, Inputs, Method, Outcome};
+use vargeo::optimize::Silent;
+
+fn length(vector: [f64; 3]) -> f64 {
+    dot(vector, vector).sqrt()
+}
+
+fn golden() -> Value {
+    serde_json::from_str(include_str!("golden/g1_surface.json")).expect("the stored file is valid JSON")
+}
+
+fn rows<T: serde::de::DeserializeOwned>(value: &Value) -> T {
+    serde_json::from_value(value.clone()).expect("rows of numbers")
+}
+
+fn network_of(mesh: &QuadrilateralMesh) -> Network {
+    let connectivity = Connectivity::of(&mesh.quads, mesh.points.len()).expect("an oriented surface");
+    let normals = mesh.normals.as_ref().expect("normals");
+    Network::natural(mesh, connectivity, normals)
+        .expect("normals that fit")
+        .0
+}
+
+/// The default construction.
+fn patches(network: &mut Network) -> Vec<Patch> {
+    enclosure::enclose(network, &mut Silent).expect("a small system");
+    let slopes = edge_normals::exact(network, true).expect("a small system");
+    (0..network.quads.len())
+        .map(|quad| {
+            fit(
+                network,
+                &slopes,
+                quad,
+                Solve::Exact,
+                Reference::Adini,
+                Operator::Laplacian,
+            )
+            .patch
+        })
+        .collect()
+}
+
+fn small(name: &str) -> Value {
+    match name {
+        "sphere" => json!({ "cells": 2 }),
+        "ellipsoid" => json!({ "cells": 3, "jitter": 0.2 }),
+        "head" => json!({ "cells": 6 }),
+        "torus" => json!({ "around": 8, "across": 6, "jitter": 0.15 }),
+        "poles" => json!({ "valence": 8, "cells": 2 }),
+        "saddle" => json!({ "cells": 5, "jitter": 0.2 }),
+        _ => Value::Null,
+    }
+}
+
+fn run(part: Part, settings: Value) -> Result<Outcome, Failure> {
+    let mut model = LoadedModel::default();
+    model.parts.insert("mesh".to_string(), part);
+    let inputs = Inputs {
+        settings: &settings,
+        model,
+    };
+    G1Surface.run(inputs, &mut Silent)
+}
+
+fn file(text: &str) -> Part {
+    Part::File {
+        name: "mesh.obj".to_string(),
+        bytes: text.as_bytes().to_vec(),
+        parameters: json!({}),
+    }
+}
+
+fn generated(name: &str, parameters: Value) -> Part {
+    Part::Generated {
+        generator: name.to_string(),
+        parameters,
+    }
+}
+
+#[test]
+fn natural_cubics_equal_the_stored_ones_and_solve_the_papers_system() {
+    for curve in golden()["curves"].as_array().expect("a list") {
+        let [p1, p2, n1, n2, t1, t2] = ["p1", "p2", "n1", "n2", "t1", "t2"].map(|name| rows::<[f64; 3]>(&curve[name]));
+        let found = natural([p1, p2], [n1, n2]);
+        let [l1, l2] = found.multipliers;
+        for (tangent, stored) in found.tangents.iter().zip([t1, t2]) {
+            assert!(length(subtract(*tangent, stored)) < 1e-13);
+        }
+        for (multiplier, stored) in [(l1, &curve["l1"]), (l2, &curve["l2"])] {
+            assert!((multiplier - stored.as_f64().expect("a number")).abs() < 1e-12);
+        }
+        // X''(0) = l1 n1 and X''(1) = l2 n2.
+        let coefficients = [p1, p2, found.tangents[0], found.tangents[1]];
+        for (x, multiplier, normal) in [(0.0, l1, n1), (1.0, l2, n2)] {
+            let second = hermite::combine(&hermite::second_derivatives(x), &coefficients);
+            let wanted = normal.map(|component| multiplier * component);
+            assert!(length(subtract(second, wanted)) < 1e-12);
+        }
+    }
+}
+
+#[test]
+fn tangents_that_meet_the_enclosure_condition_equal_the_stored_ones() {
+    let golden = &golden()["ellipsoid"];
+    let mesh = QuadrilateralMesh {
+        points: rows(&golden["V"]),
+        quads: rows(&golden["Q"]),
+        normals: Some(rows(&golden["N"])),
+    };
+    let mut network = network_of(&mesh);
+    let ends: Vec<[u32; 2]> = rows(&golden["edges"]);
+    let places: Vec<usize> = ends
+        .iter()
+        .map(|edge| {
+            network
+                .connectivity
+                .edges
+                .iter()
+                .position(|other| other == edge)
+                .expect("the same edges")
+        })
+        .collect();
+    let stored: Vec<f64> = rows(&golden["enclosure_natural"]);
+    let mut spokes = Vec::new();
+    for (vertex, stored) in stored.iter().enumerate() {
+        if network.is_even(vertex) {
+            network.spokes(vertex, &mut spokes);
+            // The stored fans may start at another spoke, which changes the sign.
+            let found = enclosure::violation(&spokes, network.normals[vertex]);
+            assert!(
+                (found.abs() - stored.abs()).abs() < 1e-13,
+                "vertex {vertex}: {found} and {stored}"
+            );
+        }
+    }
+    let compare = |network: &Network, name: &str, end: usize, tolerance: f64| {
+        let stored: Vec<[f64; 3]> = rows(&golden[name]);
+        for (&place, stored) in places.iter().zip(stored) {
+            let error = length(subtract(network.tangents[place][end], stored));
+            assert!(error < tolerance, "{name}: {error}");
+        }
+    };
+    compare(&network, "natural_t1", 0, 1e-14);
+    let done = enclosure::enclose(&mut network, &mut Silent).expect("a small system");
+    assert!(done.before > 1e-3 && done.residual < 1e-14, "{done:?}");
+    // The program that made the stored ones differentiates numerically.
+    compare(&network, "t1", 0, 1e-8);
+    compare(&network, "t2", 1, 1e-8);
+}
+
+#[test]
+fn normals_agree_along_every_edge_of_every_generated_surface() {
+    for generator in surfaces() {
+        let name = generator.name;
+        let mesh = generate_surface(name, &small(name)).expect("valid").mesh;
+        let mut network = network_of(&mesh);
+        let rough: Vec<Patch> = (0..mesh.quads.len())
+            .map(|quad| patch::continuous(&network, quad, Operator::Laplacian).patch)
+            .collect();
+        let rough = continuity::measure(&rough, &network.connectivity);
+        let smooth = continuity::measure(&patches(&mut network), &network.connectivity);
+        assert!(smooth.gap < 1e-14, "{name}: gap {}", smooth.gap);
+        assert!(smooth.largest < 1e-10, "{name}: {} degrees", smooth.largest);
+        // The measure sees patches that only share their curves.
+        assert!(
+            name == "strip" || rough.largest > 1e-2,
+            "{name}: {} degrees",
+            rough.largest
+        );
+    }
+}
+
+#[test]
+fn every_way_to_the_normals_gives_the_same_promise() {
+    let mesh = generate_surface("torus", &small("torus")).expect("valid").mesh;
+    let natural = network_of(&mesh);
+    let mut network = natural.clone();
+    enclosure::enclose(&mut network, &mut Silent).expect("a small system");
+    let short = edge_normals::exact(&network, true).expect("a small system");
+    let local = edge_normals::exact(&network, false).expect("no system");
+    let squares = |slopes: &edge_normals::Slopes| slopes.iter().flatten().map(|&b| dot(b, b)).sum::<f64>();
+    for slopes in [&short, &local] {
+        let residuals = edge_normals::residuals(&network, slopes);
+        assert!(
+            residuals.perpendicular < 1e-13 && residuals.twist < 1e-13,
+            "{residuals:?}"
+        );
+    }
+    assert!(squares(&short) < squares(&local));
+    // The shortest of all solutions is what a singular value decomposition finds.
+    let solved = least_squares::solve(&network, 1e-10).expect("a small system");
+    for (a, b) in solved.slopes.iter().flatten().zip(short.iter().flatten()) {
+        assert!(length(subtract(*a, *b)) < 1e-9);
+    }
+    let mut network = natural.clone();
+    let balanced = balance::balance(&mut network, 10.0, None, &mut Silent).expect("a small system");
+    assert!(balanced.residual < 1e-12, "{}", balanced.residual);
+    let residuals = edge_normals::residuals(&network, &balanced.slopes);
+    assert!(
+        residuals.perpendicular < 1e-12 && residuals.twist < 1e-12,
+        "{residuals:?}"
+    );
+    // The paper's steps on the paper's curves cannot: the measure is able to fail.
+    let solved = least_squares::solve(&natural, 1e-10).expect("a small system");
+    assert!(edge_normals::residuals(&natural, &solved.slopes).twist > 1e-3);
+}
+
+#[test]
+fn the_rank_of_the_papers_system_is_known() {
+    for (name, parameters) in [
+        ("ellipsoid", json!({ "cells": 2 })),
+        ("poles", json!({ "valence": 5, "cells": 1 })),
+    ] {
+        let network = network_of(&generate_surface(name, &parameters).expect("valid").mesh);
+        let expected = 6 * network.tangents.len() - network.even_vertices();
+        assert_eq!(least_squares::rank(&network, 1e-10), Some(expected), "{name}");
+    }
+}
+
+#[test]
+fn numbering_and_position_do_not_matter() {
+    let mesh = generate_surface("icosahedron", &json!({ "level": 0 }))
+        .expect("valid")
+        .mesh;
+    let mut network = network_of(&mesh);
+    let before = patches(&mut network);
+    // Vertices in another order, quads from another corner, the whole turned and moved.
+    let count = mesh.points.len();
+    let rename = |vertex: usize| (vertex * 7 + 3) % count;
+    let turn = |[x, y, z]: [f64; 3]| {
+        [
+            0.36 * x + 0.48 * y - 0.8 * z,
+            -0.8 * x + 0.6 * y,
+            0.48 * x + 0.64 * y + 0.6 * z,
+        ]
+    };
+    let mut moved = mesh.clone();
+    let normals = mesh.normals.as_ref().expect("normals");
+    let mut moved_normals = normals.clone();
+    for vertex in 0..count {
+        let point = turn(mesh.points[vertex]);
+        moved.points[rename(vertex)] = [point[0] + 1.0, point[1] - 2.0, point[2] + 0.5];
+        moved_normals[rename(vertex)] = turn(normals[vertex]);
+    }
+    moved.normals = Some(moved_normals);
+    for (index, quad) in moved.quads.iter_mut().enumerate() {
+        let old = quad.map(|vertex| rename(vertex as usize) as u32);
+        *quad = std::array::from_fn(|corner| old[(corner + index) % 4]);
+    }
+    let after = patches(&mut network_of(&moved));
+    for (index, (a, b)) in before.iter().zip(&after).enumerate() {
+        for (u, v) in [(0.5, 0.5), (0.2, 0.7), (0.9, 0.4)] {
+            // Corner `index mod 4` of the old patch is corner 0 of the new one.
+            let (s, t) = (0..index % 4).fold((u, v), |(s, t), _| (t, 1.0 - s));
+            let [u, v, s, t] = [u, v, s, t].map(surface::Place::new);
+            let old = turn(surface::position(a, &u, &v));
+            let new = surface::position(b, &s, &t);
+            let expected = [old[0] + 1.0, old[1] - 2.0, old[2] + 0.5];
+            assert!(
+                length(subtract(new, expected)) < 1e-9,
+                "patch {index}: {new:?} and {expected:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn plane_data_give_plane_patches_and_derivatives_fit() {
+    let flat = generate_surface("saddle", &json!({ "cells": 3, "height": 0.0, "jitter": 0.2 }))
+        .expect("valid")
+        .mesh;
+    for patch in patches(&mut network_of(&flat)) {
+        assert!(patch.iter().all(|coefficient| coefficient[2].abs() < 1e-14));
+    }
+    let curved = generate_surface("ellipsoid", &small("ellipsoid")).expect("valid").mesh;
+    let patch = patches(&mut network_of(&curved))[4];
+    let (u, v, step) = (0.3, 0.6, 1e-4);
+    let at = |u: f64, v: f64| surface::evaluate(&patch, &surface::Place::new(u), &surface::Place::new(v));
+    let here = at(u, v);
+    for axis in 0..3 {
+        let difference = |a: [f64; 3], b: [f64; 3]| (a[axis] - b[axis]) / (2.0 * step);
+        assert!((difference(at(u + step, v).position, at(u - step, v).position) - here.u[axis]).abs() < 1e-6);
+        assert!((difference(at(u + step, v).u, at(u - step, v).u) - here.uu[axis]).abs() < 1e-6);
+        assert!((difference(at(u, v + step).u, at(u, v - step).u) - here.uv[axis]).abs() < 1e-6);
+        assert!((difference(at(u, v + step).v, at(u, v - step).v) - here.vv[axis]).abs() < 1e-6);
+    }
+    // The control points span the same surface.
+    let control = surface::control_points(&patch);
+    let weights = |t: f64| {
+        let s = 1.0 - t;
+        [
+            s * s * s * s,
+            4.0 * s * s * s * t,
+            6.0 * s * s * t * t,
+            4.0 * s * t * t * t,
+            t * t * t * t,
+        ]
+    };
+    let (f, g) = (weights(u), weights(v));
+    for axis in 0..3 {
+        let value: f64 = (0..25)
+            .map(|index| f[index / 5] * g[index % 5] * control[index][axis])
+            .sum();
+        assert!((value - here.position[axis]).abs() < 1e-14);
+    }
+}
+
+#[test]
+fn curves_tend_to_the_chord_with_the_normals() {
+    for exponent in 0..=15 {
+        let tilt = 10f64.powi(-exponent);
+        let outcome = run(generated("strip", json!({ "tilt": tilt })), json!({})).expect("a surface");
+        let height = outcome.metrics["chord_distance"];
+        if tilt <= 1e-2 {
+            let ratio = height / (tilt * 4.0 / 27.0);
+            assert!((ratio - 1.0).abs() < 1e-3, "tilt {tilt}: {height}");
+        }
+        assert!(outcome.metrics["normal_slope"] < 10.0 * tilt, "tilt {tilt}");
+        assert_eq!(outcome.metrics["folded"], 0.0);
+    }
+}
+
+#[test]
+fn the_certificate_agrees_with_sampling() {
+    // A cube with its control points moved by growing amounts, always the same way.
+    let mut state = 1u64;
+    let mut random = || {
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (state >> 11) as f64 / (1u64 << 53) as f64 - 0.5
+    };
+    let (mut positive, mut negative) = (0, 0);
+    for trial in 0..24 {
+        let amount = 0.1 + 0.05 * f64::from(trial % 12);
+        let points: ControlPoints = std::array::from_fn(|index| {
+            [index / 25, index / 5 % 5, index % 5].map(|place| place as f64 / 4.0 + amount * random())
+        });
+        let mut least = f64::INFINITY;
+        for index in 0..729 {
+            let at = [index / 81, index / 9 % 9, index % 9].map(|place| place as f64 / 8.0);
+            least = least.min(bernstein::jacobian(&points, at).0);
+        }
+        match bernstein::certify(&points, 512) {
+            Verdict::Positive { bound, .. } => {
+                positive += 1;
+                assert!(bound > 0.0 && bound <= least, "{bound} and {least}");
+            }
+            Verdict::NotPositive { value } => {
+                negative += 1;
+                assert!(value <= 1e-9, "{value}");
+            }
+            Verdict::Undecided { .. } => assert!(least < 0.1),
+        }
+    }
+    assert!(positive > 3 && negative > 3, "{positive} positive, {negative} not");
+}
+
+#[test]
+fn hexahedra_of_a_head_are_valid_and_fill_the_shell() {
+    let settings = json!({ "hexahedra": "inward", "layers": 2, "sphere_ratio": 0.5 });
+    let outcome = run(generated("sphere", json!({ "cells": 3 })), settings).expect("hexahedra");
+    let metric = |name: &str| outcome.metrics[name];
+    assert_eq!(
+        (metric("hexahedra_count"), metric("jacobian_certified")),
+        (108.0, 108.0)
+    );
+    assert!(metric("jacobian_bound") > 0.0 && metric("jacobian_min") > 0.3);
+    let shell = 4.0 / 3.0 * std::f64::consts::PI * (1.0 - 0.125);
+    assert!(
+        (metric("hexahedra_volume") / shell - 1.0).abs() < 2e-3,
+        "{}",
+        metric("hexahedra_volume")
+    );
+    let failure = run(generated("saddle", json!({})), json!({ "hexahedra": "inward" })).expect_err("an open surface");
+    assert!(failure.reason.contains("closed"), "{}", failure.reason);
+}
+
+#[test]
+fn the_test_problem_converges_as_fast_as_the_geometry_allows() {
+    let error = |cells: usize, facets: bool, order: usize| {
+        let generated = generate_surface("sphere", &json!({ "cells": cells })).expect("valid");
+        let mut network = network_of(&generated.mesh);
+        let patches = if facets {
+            generated
+                .mesh
+                .quads
+                .iter()
+                .map(|&quad| patch::bilinear(generated.mesh.corners(quad)))
+                .collect()
+        } else {
+            patches(&mut network)
+        };
+        let exact = generated.exact.expect("a formula");
+        laplace_beltrami::solve(&patches, &network.quads, &network.connectivity, &exact, order)
+            .expect("a positive system")
+            .error
+    };
+    let rate = |facets: bool, order: usize| (error(2, facets, order) / error(4, facets, order)).log2();
+    assert!((rate(true, 1) - 2.0).abs() < 0.3, "facets, order 1: {}", rate(true, 1));
+    assert!((rate(true, 4) - 2.0).abs() < 0.3, "facets, order 4: {}", rate(true, 4));
+    assert!(rate(false, 2) > 2.5, "patches, order 2: {}", rate(false, 2));
+    assert!(error(4, false, 3) < 0.1 * error(4, true, 3));
+}
+
+#[test]
+fn threads_do_not_change_a_bit() {
+    let with = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .expect("threads");
+        pool.install(|| run(generated("head", json!({ "cells": 8 })), json!({ "tessellation": 2 })).expect("a surface"))
+    };
+    let (one, three) = (with(1), with(3));
+    let bits = |outcome: &Outcome| -> Vec<u64> { outcome.metrics.values().map(|value| value.to_bits()).collect() };
+    assert_eq!(bits(&one), bits(&three));
+    assert_eq!(one.mesh, three.mesh);
+}
+
+#[test]
+fn what_cannot_be_used_is_named() {
+    let square = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
+    let reason = |text: String, settings: Value| run(file(&text), settings).expect_err("bad input").reason;
+    // A vertex without a normal, one with a normal in the plane of its edges, one along an edge.
+    let text = format!("{square}vn 0 0 1\nf 1//1 2//1 3//1 4\n");
+    assert!(reason(text, json!({})).contains("vertex 3 (from 0) has no normal"));
+    let text = format!("{square}vn 0 0 1\nvn 1 1 0\nf 1//1 2//1 3//1 4//2\n");
+    assert!(reason(text, json!({})).contains("vertex 3"));
+    let text = format!("{square}vn 0 0 1\nvn 1 0 0\nf 1//1 2//2 3//1 4//1\n");
+    assert!(reason(text, json!({})).contains("vertex 1"));
+    let text = format!("{square}f 1 2 3 4\nf 1 2 3\n");
+    assert!(reason(text, json!({})).contains("triangles"));
+    let text = "v 0 0 0\nv 0 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n".to_string();
+    assert!(reason(text, json!({})).contains("without length"));
+    let text = format!("{square}v 0 0 1\nv 1 0 1\nv 0 -1 0\nv 1 -1 0\nf 1 2 3 4\nf 2 1 5 6\nf 1 2 8 7\n");
+    assert!(reason(text, json!({})).contains("more than two"));
+    let text = format!("{square}f 1 2 3 4\n");
+    assert!(reason(text.clone(), json!({ "vertex_normals": "given" })).contains("no normals"));
+    assert!(reason(text.clone(), json!({ "vertex_normals": "surface" })).contains("no `surface`"));
+    assert!(reason(text.clone(), json!({ "order": 2 })).contains("formula"));
+    // The same square is fine as it is.
+    let outcome = run(file(&text), json!({})).expect("a plane patch");
+    assert_eq!(outcome.stop, "converged");
+    assert!(outcome.metrics["area"] - 1.0 < 1e-14);
+}

@@ -170,7 +170,7 @@ pub static FIELDS: &[Field] = &[
     Field {
         name: "feature_angle",
         kind: Kind::Number { min: 1.0, max: 180.0 },
-        default: Default::Number(40.0),
+        default: Default::Number(30.0),
         doc: "Edges of the target with a larger angle between its normals, in degrees, are the crease lines that the \
               crease metrics measure; changes no fit.",
     },

@@ -84,7 +84,7 @@ fn disk(cells: usize) -> Planar {
 
 /// Rings of equally many points at equal distances, from the radius 1/4 to 5/4.
 fn annulus(family: Family, cells: usize) -> Result<(Planar, Vec<usize>), String> {
-    if cells % 4 != 0 {
+    if !cells.is_multiple_of(4) {
         return Err(format!(
             "{cells} cells a unit do not meet the inner ring of an annulus; take a multiple of 4"
         ));

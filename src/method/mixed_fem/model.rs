@@ -251,7 +251,7 @@ fn generate(generator: &str, parameters: &Value) -> Result<Model, Failure> {
                 upper_size: size("upper_size", 0.5),
                 gap: size("gap", 1.0),
                 height: size("height", 0.6),
-                around: if around % 8 == 0 {
+                around: if around.is_multiple_of(8) {
                     around
                 } else {
                     around + 8 - around % 8

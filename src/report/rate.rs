@@ -28,7 +28,7 @@ pub struct Fit {
     /// Points within the window, by x.
     pub points: Vec<(f64, f64)>,
     pub line: Option<Line>,
-    /// Rate between the last two x in the direction in which the jobs go.
+    /// Rate between the last two x in the direction in which the jobs go, the mean of the seeds where there are several.
     pub last_pair: Option<f64>,
     /// Lowest and highest slope over the values of an axis named `seed`, each fitted alone, and their count.
     pub spread: Option<(f64, f64, usize)>,
@@ -142,6 +142,9 @@ fn fit_series(rate: &Rate, rows: &[Row]) -> Vec<Fit> {
                 let high = slopes.iter().copied().fold(f64::NEG_INFINITY, f64::max);
                 (low, high, slopes.len())
             });
+            // Meshes of different seeds differ a little in x: each seed has a last pair of its own.
+            let last: Vec<f64> = groups.iter().filter_map(|group| last_pair(&group.1)).collect();
+            let last = (!last.is_empty()).then(|| last.iter().sum::<f64>() / last.len() as f64);
             let pairs: Vec<(f64, f64)> = points.iter().map(|point| (point.x, point.y)).collect();
             Fit {
                 rate: rate.name.clone(),
@@ -149,7 +152,7 @@ fn fit_series(rate: &Rate, rows: &[Row]) -> Vec<Fit> {
                 x: rate.x.clone(),
                 y: rate.y.clone(),
                 line: fit(&pairs),
-                last_pair: last_pair(&pairs),
+                last_pair: last,
                 points: pairs,
                 spread,
                 window: rate.window,

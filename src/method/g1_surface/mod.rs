@@ -258,7 +258,9 @@ pub fn build(problem: &Problem, settings: &Settings, observer: &mut dyn Observer
                 let found = match balanced {
                     Ok(found) => found,
                     Err(error) => {
-                        notices.push(format!("folded patches are left as they are, their repair failed: {error}"));
+                        notices.push(format!(
+                            "folded patches are left as they are, their repair failed: {error}"
+                        ));
                         break;
                     }
                 };

@@ -29,6 +29,25 @@ pub struct Metric {
     pub definition: &'static str,
 }
 
+/// A metric in one line, for lists of them.
+pub(crate) const fn metric(
+    name: &'static str,
+    symbol: &'static str,
+    unit: &'static str,
+    floor: Option<f64>,
+    better: Better,
+    definition: &'static str,
+) -> Metric {
+    Metric {
+        name,
+        symbol,
+        unit,
+        floor,
+        better,
+        definition,
+    }
+}
+
 /// Every family of metrics of this floor; methods name those that they report and add their own.
 pub fn families() -> [(&'static str, &'static [Metric]); 3] {
     [

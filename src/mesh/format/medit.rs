@@ -86,8 +86,8 @@ pub(super) fn read(bytes: &[u8]) -> Result<Content, Fault> {
             for number in 1..=count {
                 for corner in &mut cell[..corners] {
                     let index = text.integer(format_args!("a vertex number of {} {number}", kind.name()))?;
-                    // Out of range for now where it does not fit; the check below names the line.
-                    *corner = u32::try_from(index - 1).unwrap_or(u32::MAX);
+                    // A number that does not fit becomes one out of range; the check below names its line.
+                    *corner = u32::try_from(index.saturating_sub(1)).unwrap_or(u32::MAX);
                 }
                 let label = text.integer(format_args!("the reference of {} {number} in {name}", kind.name()))?;
                 cell_labels.push(label as f64);

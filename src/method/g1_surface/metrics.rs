@@ -1,24 +1,6 @@
 //! The figures that every G1 surface is described by: their definitions.
 
-use crate::metric::{Better, Metric};
-
-const fn metric(
-    name: &'static str,
-    symbol: &'static str,
-    unit: &'static str,
-    floor: Option<f64>,
-    better: Better,
-    definition: &'static str,
-) -> Metric {
-    Metric {
-        name,
-        symbol,
-        unit,
-        floor,
-        better,
-        definition,
-    }
-}
+use crate::metric::{Better, Metric, metric};
 
 const LOWER: Better = Better::Lower;
 const PLAIN: Better = Better::Neither;

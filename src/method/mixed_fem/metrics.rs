@@ -1,24 +1,6 @@
 //! The metrics of a mixed finite element computation.
 
-use crate::metric::{Better, Metric};
-
-const fn metric(
-    name: &'static str,
-    symbol: &'static str,
-    unit: &'static str,
-    floor: Option<f64>,
-    better: Better,
-    definition: &'static str,
-) -> Metric {
-    Metric {
-        name,
-        symbol,
-        unit,
-        floor,
-        better,
-        definition,
-    }
-}
+use crate::metric::{Better, Metric, metric};
 
 /// Every metric; those that a job's data give no meaning are not-a-number.
 pub static ALL: &[Metric] = &[

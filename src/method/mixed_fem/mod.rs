@@ -11,6 +11,7 @@
 
 pub mod domain;
 pub mod factorization;
+pub mod fields;
 pub mod function;
 pub mod handles;
 pub mod hole;
@@ -61,7 +62,7 @@ impl Method for MixedFem {
     }
 
     fn settings(&self) -> &'static [Field] {
-        settings::FIELDS
+        fields::FIELDS
     }
 
     fn check(&self, settings: &Value) -> Vec<(String, String)> {

@@ -1,25 +1,7 @@
 //! The figures that every surface fit is described by: their definitions.
 
-use crate::metric::{Better, Metric, distance};
+use crate::metric::{Better, Metric, distance, metric};
 use std::sync::LazyLock;
-
-const fn metric(
-    name: &'static str,
-    symbol: &'static str,
-    unit: &'static str,
-    floor: Option<f64>,
-    better: Better,
-    definition: &'static str,
-) -> Metric {
-    Metric {
-        name,
-        symbol,
-        unit,
-        floor,
-        better,
-        definition,
-    }
-}
 
 /// Those that only this method has.
 const OWN: &[Metric] = &[

@@ -1,24 +1,6 @@
 //! The figures that every volume fit is described by: their definitions.
 
-use crate::metric::{Better, Metric};
-
-const fn metric(
-    name: &'static str,
-    symbol: &'static str,
-    unit: &'static str,
-    floor: Option<f64>,
-    better: Better,
-    definition: &'static str,
-) -> Metric {
-    Metric {
-        name,
-        symbol,
-        unit,
-        floor,
-        better,
-        definition,
-    }
-}
+use crate::metric::{Better, Metric, metric};
 
 /// Every metric of a volume fit.
 pub static ALL: &[Metric] = &[

@@ -119,17 +119,23 @@ impl State<'_> {
         for end in 0..2 {
             let change = [y[3 * end], y[3 * end + 1], y[3 * end + 2]];
             let normal = self.network.normals[ends[end] as usize];
-            let moved = add(self.natural[edge][end], times(change, chord / self.stiffness));
-            self.network.tangents[edge][end] = in_plane(moved, normal);
+            if !self.network.on_crease[edge] {
+                let moved = add(self.natural[edge][end], times(change, chord / self.stiffness));
+                self.network.tangents[edge][end] = in_plane(moved, normal);
+            }
             self.free[edge].s[end] = y[6 + end] / [first, second][end];
             self.free[edge].v[end] = y[8 + end];
         }
     }
 
-    /// Factors from scaled to plain unknowns.
+    /// Factors from scaled to plain unknowns; the tangents of creases do not change.
     fn factors(&self, edge: usize) -> [f64; UNKNOWNS] {
         let [chord, first, second] = self.sizes[edge];
-        let t = chord / self.stiffness;
+        let t = if self.network.on_crease[edge] {
+            0.0
+        } else {
+            chord / self.stiffness
+        };
         [t, t, t, t, t, t, 1.0 / first, 1.0 / second, 1.0, 1.0]
     }
 

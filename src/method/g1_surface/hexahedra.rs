@@ -57,10 +57,10 @@ pub fn build(
     layers: usize,
     observer: &mut dyn Observer,
 ) -> Result<Hexahedra, String> {
-    if problem.connectivity.boundary_edges() > 0 {
+    let open = problem.whole().1.boundary_edges();
+    if open > 0 {
         return Err(format!(
-            "hexahedra need a closed surface; this one has {} boundary edges",
-            problem.connectivity.boundary_edges()
+            "hexahedra need a closed surface; this one has {open} boundary edges"
         ));
     }
     let sphere = sphere(problem, shell, observer)?;
@@ -127,7 +127,9 @@ pub fn build(
 
 /// The patches of the sphere.
 fn sphere(problem: &Problem, shell: Shell, observer: &mut dyn Observer) -> Result<Vec<Patch>, String> {
-    let points = &problem.mesh.points;
+    // Creases are no matter to the sphere.
+    let (mesh, connectivity) = problem.whole();
+    let points = &mesh.points;
     let mut low = points[0];
     let mut high = points[0];
     for point in points {
@@ -145,7 +147,7 @@ fn sphere(problem: &Problem, shell: Shell, observer: &mut dyn Observer) -> Resul
     if !(radius > 0.0) {
         return Err("a vertex lies at the centre of the surface's box; no sphere fits inside".to_string());
     }
-    let mut mesh = problem.mesh.clone();
+    let mut mesh = mesh.clone();
     let mut normals = Vec::with_capacity(points.len());
     for point in &mut mesh.points {
         let away = subtract(*point, centre);
@@ -164,7 +166,7 @@ fn sphere(problem: &Problem, shell: Shell, observer: &mut dyn Observer) -> Resul
                 .to_string(),
         );
     }
-    let (mut network, _) = Network::natural(&mesh, problem.connectivity.clone(), &normals)?;
+    let (mut network, _) = Network::natural(&mesh, connectivity.clone(), &normals)?;
     enclosure::enclose(&mut network, observer)?;
     let slopes = edge_normals::exact(&network, true)?;
     let fit = |quad| {

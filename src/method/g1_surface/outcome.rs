@@ -51,7 +51,8 @@ pub fn measure(problem: &Problem, normals: &[[f64; 3]], patches: &[Patch], metri
     let measured: Vec<Measured> = patches
         .par_iter()
         .zip(&problem.mesh.quads)
-        .map(|(patch, quad)| {
+        .enumerate()
+        .map(|(index, (patch, quad))| {
             let mut found = Measured::default();
             for (u, weight_u) in &gauss {
                 for (v, weight_v) in &gauss {
@@ -66,7 +67,7 @@ pub fn measure(problem: &Problem, normals: &[[f64; 3]], patches: &[Patch], metri
             if let Some(truth) = &problem.truth {
                 for u in &places {
                     for v in &places {
-                        let distance = truth.distance(surface::position(patch, u, v));
+                        let distance = truth.distance(index, surface::position(patch, u, v));
                         found.distance_max = found.distance_max.max(distance);
                         found.distance_squares += distance * distance;
                     }
@@ -93,14 +94,21 @@ pub fn measure(problem: &Problem, normals: &[[f64; 3]], patches: &[Patch], metri
     }
     set("angle_max", continuity.largest);
     set("angle_rms", continuity.mean_square);
-    set("gap", continuity.gap / diagonal(&problem.mesh.points));
+    let size = diagonal(&problem.mesh.points);
+    set("gap", continuity.gap / size);
+    if let Some(creases) = &problem.creases {
+        let [gap, angle] = continuity::measure_creases(patches, &problem.connectivity, &creases.pairs);
+        set("crease_gap", gap / size);
+        set("crease_angle", angle);
+    }
     continuity
 }
 
 impl Truth {
-    /// The distance of a point near the surface.
-    pub fn distance(&self, point: [f64; 3]) -> f64 {
+    /// The distance of a point near the surface; of a point over this quad, where every quad lies on a piece.
+    pub fn distance(&self, quad: usize, point: [f64; 3]) -> f64 {
         match self {
+            Truth::Pieces(creased) => creased.pieces[creased.piece_of[quad] as usize].distance(point),
             Truth::Analytic(exact) => exact.distance(point),
             Truth::Sampled(surface) => surface.distance(point),
         }
@@ -245,12 +253,8 @@ pub fn control_nets(patches: &[Patch]) -> Vec<u8> {
 
 /// The mean length of the chords of the edges.
 pub fn mean_edge(problem: &Problem) -> f64 {
-    let edges = &problem.connectivity.edges;
-    let chord = |&[a, b]: &[u32; 2]| {
-        length(subtract(
-            problem.mesh.points[b as usize],
-            problem.mesh.points[a as usize],
-        ))
-    };
+    let (mesh, connectivity) = problem.whole();
+    let edges = &connectivity.edges;
+    let chord = |&[a, b]: &[u32; 2]| length(subtract(mesh.points[b as usize], mesh.points[a as usize]));
     edges.iter().map(chord).sum::<f64>() / edges.len().max(1) as f64
 }

@@ -58,6 +58,32 @@ pub static FIELDS: &[Field] = &[
         doc: "Where the normals at the vertices come from.",
     },
     Field {
+        name: "creases",
+        kind: Kind::Choice(&[
+            (
+                "keep",
+                "patches meet continuously at creases, with a normal on either side, and with common tangent planes elsewhere",
+            ),
+            ("smooth", "creases are passed over: one normal a vertex"),
+        ]),
+        default: Default::Text("keep"),
+        doc: "What to do with edges that the generator, the model's `creases`, `crease_field` or `crease_angle` call sharp.",
+    },
+    Field {
+        name: "crease_angle",
+        kind: Kind::Number { min: 0.0, max: 180.0 },
+        default: Default::Absent,
+        doc: "Edges are sharp where the planes of their quadrilaterals meet at more than this angle, in degrees; absent: the \
+              angle decides nothing.",
+    },
+    Field {
+        name: "crease_field",
+        kind: Kind::Text,
+        default: Default::Absent,
+        doc: "Name of a cell field of the mesh's file, such as `reference`: edges between quadrilaterals with different values \
+              are sharp.",
+    },
+    Field {
         name: "tangents",
         kind: Kind::Choice(&[
             (
@@ -256,6 +282,11 @@ pub enum Patches {
 pub struct Settings {
     pub geometry: Geometry,
     pub vertex_normals: VertexNormals,
+    pub creases: String,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub crease_angle: Option<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub crease_field: Option<String>,
     pub tangents: Tangents,
     pub tangent_stiffness: f64,
     pub repair: bool,
@@ -302,6 +333,11 @@ impl Settings {
             kind: "invalid-input".to_string(),
             reason: format!("settings of g1-surface: {error}"),
         })
+    }
+
+    /// Whether sharp edges stay sharp.
+    pub fn keeps_creases(&self) -> bool {
+        self.creases == "keep"
     }
 
     pub fn solve(&self) -> Solve {
@@ -352,6 +388,9 @@ impl Settings {
                 table.remove(*name);
             }
         };
+        if !self.keeps_creases() {
+            drop(&["crease_angle", "crease_field"]);
+        }
         if self.geometry != Geometry::G1 {
             drop(&[
                 "tangents",

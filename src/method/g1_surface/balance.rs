@@ -303,10 +303,14 @@ fn inner(a: &[f64; UNKNOWNS], b: &[f64; UNKNOWNS]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-/// The inverse of the block of an edge's own two conditions, with a small shift where the curve is straight.
+/// The inverse of the block of an edge's own two conditions, with a small shift where the curve is straight; zero for edges
+/// that may not change.
 fn inverse(edge: &Edge) -> [[f64; 2]; 2] {
     let [p, q, r] = [(4, 4), (4, 5), (5, 5)].map(|(a, b)| inner(&edge.rows[a], &edge.rows[b]));
-    let shift = 1e-14 * (p + r) + 1e-200;
+    if p + r == 0.0 {
+        return [[0.0; 2]; 2];
+    }
+    let shift = 1e-14 * (p + r);
     let (p, r) = (p + shift, r + shift);
     let determinant = p * r - q * q;
     [[r / determinant, -q / determinant], [-q / determinant, p / determinant]]
@@ -499,7 +503,7 @@ pub fn balance(
         let mut accepted = false;
         let mut ended = false;
         while step > 1e-4 {
-            for edge in 0..edges.len() {
+            for edge in (0..edges.len()).filter(|&edge| state_active[edge]) {
                 let y =
                     std::array::from_fn(|unknown| (1.0 - step) * before[edge][unknown] + step * targets[edge][unknown]);
                 state.set(edge, &y);

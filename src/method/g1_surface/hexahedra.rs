@@ -9,6 +9,7 @@
 use super::edge_normals;
 use super::enclosure;
 use super::network::Network;
+use super::outcome::Metrics;
 use super::patch::{self, Operator, Patch, Reference, Solve};
 use super::problem::Problem;
 use super::surface;
@@ -41,6 +42,34 @@ pub struct Hexahedra {
     /// Least certified bound of a determinant, over the mean determinant of its hexahedron.
     pub bound: f64,
     pub volume: f64,
+}
+
+impl Hexahedra {
+    /// Adds what is known to the metrics.
+    pub fn tell(&self, metrics: &mut Metrics) {
+        let least = self.scaled.iter().copied().fold(f64::INFINITY, f64::min);
+        for (name, value) in [
+            ("hexahedra_count", self.cells.len() as f64),
+            ("jacobian_min", least),
+            ("jacobian_certified", self.positive as f64),
+            ("jacobian_not_positive", self.not_positive as f64),
+            ("jacobian_undecided", self.undecided as f64),
+            ("jacobian_bound", self.bound),
+            ("hexahedra_volume", self.volume),
+        ] {
+            metrics.insert(name.to_string(), value);
+        }
+    }
+
+    /// The hexahedra as a VTU file of Bezier hexahedra of order 4.
+    pub fn bezier(&self) -> Vec<u8> {
+        let numbers: Vec<f64> = (0..self.cells.len()).map(|index| index as f64).collect();
+        vtu::write_bezier_hexahedra(
+            self.cells.as_flattened(),
+            4,
+            &[("hexahedron", 1, &numbers), ("scaled_jacobian", 1, &self.scaled)],
+        )
+    }
 }
 
 /// Parts into which the certificate may cut a hexahedron.

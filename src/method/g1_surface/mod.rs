@@ -13,9 +13,11 @@
 pub mod balance;
 pub mod construction;
 pub mod continuity;
+pub mod control_net;
 pub mod creases;
 pub mod edge_normals;
 pub mod enclosure;
+pub mod evaluation;
 pub mod hermite;
 pub mod hexahedra;
 pub mod laplace_beltrami;
@@ -120,53 +122,51 @@ pub fn run(problem: &Problem, settings: &Settings, observer: &mut dyn Observer) 
     built
         .metrics
         .insert("edge_length".to_string(), outcome::mean_edge(problem));
-    let metrics = &mut built.metrics;
     if settings.order > 0 {
         observer.phase("simulate");
-        let Some(Truth::Analytic(exact)) = &problem.truth else {
-            return Err(problem::invalid(
-                "the test problem needs a surface given by a formula; use a generated mesh, or order = 0".to_string(),
-            ));
-        };
-        let (quads, connectivity) = (&problem.mesh.quads, &problem.connectivity);
-        let solved = laplace_beltrami::solve(&built.patches, quads, connectivity, exact, settings.order as usize)
-            .map_err(problem::invalid)?;
-        metrics.insert("l2_error".to_string(), solved.error);
-        metrics.insert("gradient_error".to_string(), solved.gradient_error);
-        metrics.insert("unknowns".to_string(), solved.unknowns as f64);
+        simulate(problem, &built.patches, settings, &mut built.metrics)?;
     }
-    let mut other = (settings.result == "control-points").then(|| outcome::control_nets(&built.patches));
-    if let Some(shell) = settings.shell() {
+    let mut shell = None;
+    if let Some(kind) = settings.shell() {
         observer.phase("hexahedra");
-        let found = hexahedra::build(problem, &built.patches, shell, settings.layers as usize, observer)
+        let found = hexahedra::build(problem, &built.patches, kind, settings.layers as usize, observer)
             .map_err(problem::invalid)?;
-        for (name, value) in [
-            ("hexahedra_count", found.cells.len() as f64),
-            (
-                "jacobian_min",
-                found.scaled.iter().copied().fold(f64::INFINITY, f64::min),
-            ),
-            ("jacobian_certified", found.positive as f64),
-            ("jacobian_not_positive", found.not_positive as f64),
-            ("jacobian_undecided", found.undecided as f64),
-            ("jacobian_bound", found.bound),
-            ("hexahedra_volume", found.volume),
-        ] {
-            metrics.insert(name.to_string(), value);
-        }
-        let pieces = outcome::pieces(settings, found.cells.len()).min(6);
-        other = other.or_else(|| Some(hexahedra::tessellate(&found, pieces)));
+        found.tell(&mut built.metrics);
+        shell = Some(found);
     }
-    let mesh = other.unwrap_or_else(|| {
+    let angles = outcome::angles_to_neighbours(&problem.connectivity, &continuity);
+    let tessellate = || {
         outcome::tessellate(
             &built.patches,
             &problem.connectivity,
             &problem.mesh.quads,
-            &continuity,
+            &angles,
             outcome::pieces(settings, built.patches.len()),
             settings.stripes,
         )
-    });
+    };
+    let mesh = match &shell {
+        _ if settings.result == "control-points" => control_net::nets(&built.patches),
+        Some(shell) => hexahedra::tessellate(shell, outcome::pieces(settings, shell.cells.len()).min(6)),
+        None => tessellate().vtu(),
+    };
+    let mut files = BTreeMap::new();
+    if settings.exports("bezier") {
+        files.insert("bezier.vtu".to_string(), control_net::bezier(&built.patches, &angles));
+        if let Some(shell) = &shell {
+            files.insert("bezier-hexahedra.vtu".to_string(), shell.bezier());
+        }
+    }
+    if settings.exports("obj") {
+        files.insert(
+            "tessellation.obj".to_string(),
+            tessellate().obj().map_err(problem::invalid)?,
+        );
+    }
+    if settings.exports("control-points") {
+        let text = control_net::text(&built.patches);
+        files.insert("control-points.txt".to_string(), text.into_bytes());
+    }
     Ok(Outcome {
         stop: built.stop,
         reason: built.reason,
@@ -175,6 +175,28 @@ pub fn run(problem: &Problem, settings: &Settings, observer: &mut dyn Observer) 
         counters: built.counters,
         notices: built.notices,
         mesh: Some(mesh),
-        files: Default::default(),
+        files,
     })
+}
+
+/// Solves the test problem on the patches.
+fn simulate(
+    problem: &Problem,
+    patches: &[patch::Patch],
+    settings: &Settings,
+    metrics: &mut outcome::Metrics,
+) -> Result<(), Failure> {
+    let Some(Truth::Analytic(exact)) = &problem.truth else {
+        return Err(problem::invalid(
+            "the test problem needs a surface given by one formula; use a generated mesh without creases, or order = 0"
+                .to_string(),
+        ));
+    };
+    let (quads, connectivity) = (&problem.mesh.quads, &problem.connectivity);
+    let solved = laplace_beltrami::solve(patches, quads, connectivity, exact, settings.order as usize)
+        .map_err(problem::invalid)?;
+    metrics.insert("l2_error".to_string(), solved.error);
+    metrics.insert("gradient_error".to_string(), solved.gradient_error);
+    metrics.insert("unknowns".to_string(), solved.unknowns as f64);
+    Ok(())
 }

@@ -2,13 +2,15 @@
 //!
 //! A patch folds where curves meet their conditions only with long slopes of their normals: then the slopes across its sides
 //! turn over. Around such patches tangents and slopes are [balanced](super::balance) together, everything farther away stays
-//! as it is; each try takes one ring of patches more. A try is kept when fewer patches fold than before.
+//! as it is; each try takes one ring of patches more, and the last one the whole surface, from the natural cubics. A try is
+//! kept when fewer patches fold than before.
 
 use super::balance;
 use super::construction::MET;
 use super::edge_normals::Slopes;
+use super::evaluation::Evaluated;
 use super::network::Network;
-use super::outcome;
+use super::outcome::Folding;
 use super::patch::Fitted;
 use crate::optimize::Observer;
 use rayon::prelude::*;
@@ -23,8 +25,8 @@ pub struct Repaired {
     pub notice: Option<String>,
 }
 
-/// Times that tangents are found anew around folds, each within a wider neighbourhood.
-const MOST: u64 = 4;
+/// Times that tangents are found anew around folds, each within a wider neighbourhood, before the whole surface is balanced.
+const LOCAL: u64 = 4;
 
 /// Repairs the patches that fold. `fit` makes patches from a network and slopes.
 pub fn repair(
@@ -38,24 +40,27 @@ pub fn repair(
 ) -> Repaired {
     let mut done = Repaired::default();
     let mut folded = folded_patches(network, fitted);
-    while folded.contains(&true) && done.tries < MOST && observer.stop().is_none() {
+    while folded.contains(&true) && done.tries <= LOCAL && observer.stop().is_none() {
         observer.phase("repair");
         done.tries += 1;
         let count = |folded: &[bool]| folded.iter().filter(|&&folded| folded).count();
         let before = count(&folded);
-        let start = balance::Start {
-            slopes,
-            active: around(network, folded.clone(), done.tries),
-            natural: natural.to_vec(),
-        };
         let mut changed = network.clone();
-        let found = match balance::balance(&mut changed, stiffness, Some(start), observer) {
+        let start = if done.tries <= LOCAL {
+            Some(balance::Start {
+                slopes,
+                active: around(network, folded.clone(), done.tries),
+                natural: natural.to_vec(),
+            })
+        } else {
+            changed.tangents = natural.to_vec();
+            None
+        };
+        let found = match balance::balance(&mut changed, stiffness, start, observer) {
             Ok(found) => found,
             Err(error) => {
-                done.notice = Some(format!(
-                    "folded patches are left as they are, their repair failed: {error}"
-                ));
-                break;
+                done.notice = Some(format!("a repair of folded patches failed: {error}"));
+                continue;
             }
         };
         if !(found.residual < MET) {
@@ -72,10 +77,14 @@ pub fn repair(
 }
 
 fn folded_patches(network: &Network, fitted: &[Fitted]) -> Vec<bool> {
+    let folding = Folding::default();
     fitted
         .par_iter()
         .zip(&network.quads)
-        .map(|(fitted, quad)| outcome::folds(&fitted.patch, quad.map(|vertex| network.normals[vertex as usize])))
+        .map_init(Evaluated::default, |evaluated, (fitted, quad)| {
+            let corners = quad.map(|vertex| network.normals[vertex as usize]);
+            folding.folds(&fitted.patch, corners, evaluated)
+        })
         .collect()
 }
 

@@ -189,6 +189,22 @@ pub static FIELDS: &[Field] = &[
         doc: "What the result's mesh holds.",
     },
     Field {
+        name: "export",
+        kind: Kind::List(&Kind::Choice(&[
+            (
+                "bezier",
+                "`bezier.vtu`: a Bezier quadrilateral of order 4 a patch, and `bezier-hexahedra.vtu` where there are hexahedra",
+            ),
+            ("obj", "`tessellation.obj`: the tessellation with normals"),
+            (
+                "control-points",
+                "`control-points.txt`: the Bezier control points as text that reads back to the same bits",
+            ),
+        ])),
+        default: Default::Absent,
+        doc: "Further files beside the result's mesh.",
+    },
+    Field {
         name: "tessellation",
         kind: Kind::Integer { min: 1, max: 64 },
         default: Default::Absent,
@@ -297,6 +313,8 @@ pub struct Settings {
     pub reference: String,
     pub operator: String,
     pub result: String,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub export: Vec<String>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tessellation: Option<u64>,
     pub stripes: f64,
@@ -329,15 +347,24 @@ impl Settings {
             table.entry(*name).or_insert_with(|| Value::from(chosen));
         }
         table.entry("repair").or_insert(Value::from(!paper));
-        serde_json::from_value(Value::Object(table)).map_err(|error| Failure {
+        let mut settings: Settings = serde_json::from_value(Value::Object(table)).map_err(|error| Failure {
             kind: "invalid-input".to_string(),
             reason: format!("settings of g1-surface: {error}"),
-        })
+        })?;
+        // Their order does not matter.
+        settings.export.sort();
+        settings.export.dedup();
+        Ok(settings)
     }
 
     /// Whether sharp edges stay sharp.
     pub fn keeps_creases(&self) -> bool {
         self.creases == "keep"
+    }
+
+    /// Whether a further file is asked for.
+    pub fn exports(&self, name: &str) -> bool {
+        self.export.iter().any(|export| export == name)
     }
 
     pub fn solve(&self) -> Solve {
@@ -409,7 +436,7 @@ impl Settings {
         if self.shell().is_none() {
             drop(&["sphere_ratio", "layers"]);
         }
-        if self.result == "control-points" {
+        if self.result == "control-points" && !self.exports("obj") {
             drop(&["tessellation", "stripes"]);
         }
         if self.tangents == Tangents::Balanced {

@@ -1,14 +1,15 @@
 //! G1 surfaces: biquartic patches with common tangent planes over any mesh of quadrilaterals with normals.
 //!
-//! The stages: [`problem`] reads the model, [`network`] spans natural cubics over the edges, [`enclosure`] moves their
-//! tangents until surfaces of class C2 can meet at every vertex, [`edge_normals`] finds a cubic normal along every curve,
-//! [`patch`] fits the patches, [`outcome`] measures them. Source: Xue, Demkowicz, Bajaj 2004, Reconstruction of G1 surfaces
-//! with biquartic patches for hp finite element simulations.
+//! The stages: [`problem`] reads the model and cuts it open along its [`creases`], [`network`] spans natural cubics over the
+//! edges, [`enclosure`] moves their tangents until surfaces of class C2 can meet at every vertex, [`edge_normals`] finds a cubic
+//! normal along every curve, [`patch`] fits the patches, [`repair`] mends those that fold, [`outcome`] measures them;
+//! [`construction`] runs them. Source: Xue, Demkowicz, Bajaj 2004, Reconstruction of G1 surfaces with biquartic patches for hp
+//! finite element simulations.
 //!
 //! Guaranteed with the default settings, where the enclosure condition could be met (a metric tells): normals of
-//! neighbouring patches agree along their whole edge to rounding, at vertices of every valence; patches share their curves
-//! exactly; the same input gives the same bits with any number of threads. Not guaranteed: that the surface is free of
-//! folds or does not meet itself.
+//! neighbouring patches agree along their whole edge to rounding, at vertices of every valence, except along creases; patches
+//! share their curves exactly, creases too; the same input gives the same bits with any number of threads. Not guaranteed:
+//! that the surface is free of folds (a metric counts them) or does not meet itself.
 
 pub mod balance;
 pub mod construction;

@@ -142,7 +142,8 @@ impl Network {
             let size = length(normal);
             if !(size > 0.0 && size.is_finite()) {
                 return Err(format!(
-                    "vertex {vertex} (from 0) has no normal: {normal:?}; give a vector of any length but zero"
+                    "vertex {vertex} (from 0) has no normal: {normal:?}; give a vector of any length but zero, or estimate \
+                     all of them (vertex_normals = \"estimated\")"
                 ));
             }
             units.push(normal.map(|component| component / size));

@@ -95,9 +95,13 @@ pub static FIELDS: &[Field] = &[
         kind: Kind::Choice(&[
             (
                 "auto",
-                "cholesky for one-field systems, lblt for mixed ones and lu where that breaks down",
+                "cholesky for one-field systems; ldlt for mixed ones, lblt where that breaks down, then lu",
             ),
             ("cholesky", "multifrontal, nested dissection; one-field systems only"),
+            (
+                "ldlt",
+                "multifrontal, pivots of known signs, nested dissection; mixed systems only, not for curve = \"unstabilised\"",
+            ),
             (
                 "lblt",
                 "Bunch-Kaufman pivots within supernodes, nested dissection; mixed systems only",

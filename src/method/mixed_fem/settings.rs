@@ -43,6 +43,7 @@ pub enum System {
 pub enum Solver {
     Auto,
     Cholesky,
+    Ldlt,
     Lblt,
     Lu,
 }
@@ -255,7 +256,7 @@ pub fn check(settings: &Value) -> Vec<(String, String)> {
         );
     }
     let one_field = settings.one_field();
-    if one_field && matches!(settings.solver, Solver::Lblt | Solver::Lu) {
+    if one_field && matches!(settings.solver, Solver::Ldlt | Solver::Lblt | Solver::Lu) {
         error(
             "solver",
             "the one-field system is positive definite: use \"cholesky\" or system = \"mixed\"".into(),
@@ -264,7 +265,7 @@ pub fn check(settings: &Value) -> Vec<(String, String)> {
     if !one_field && settings.solver == Solver::Cholesky {
         error(
             "solver",
-            "the mixed system is indefinite: use \"lblt\" or \"lu\", or system = \"one-field\"".into(),
+            "the mixed system is indefinite: use \"ldlt\", \"lblt\" or \"lu\", or system = \"one-field\"".into(),
         );
     }
     for (index, handle) in settings.handles.iter().flatten().enumerate() {

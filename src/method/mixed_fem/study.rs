@@ -216,7 +216,8 @@ fn solve(
     } else {
         vec![true; domain.mesh.cells.len()]
     };
-    let operators = SurfaceOperators::new(domain.mesh, &selected).map_err(|error| invalid(format!("mesh: {error}")))?;
+    let operators = SurfaceOperators::on_graph(domain.mesh, &domain.graph, &selected)
+        .map_err(|error| invalid(format!("mesh: {error}")))?;
     let discretization = Discretization::new(
         domain,
         &operators,

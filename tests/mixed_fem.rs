@@ -71,7 +71,9 @@ fn scheme(name: &str) -> Value {
         "curve1" => ("curve", "first-order-ring"),
         _ => ("curve", "second-order-ring"),
     };
-    json!({ "equation": equation, "condition": condition, "curve": curve, "mass": mass })
+    json!({
+        "equation": equation, "condition": condition, "curve": curve, "mass": mass, "relaxation": "quadratic",
+    })
 }
 
 #[test]
@@ -177,8 +179,12 @@ fn the_stabilised_system_converges_where_others_do_not() {
         (coarse.1 / fine.1).ln() / (coarse.0 / fine.0).ln()
     };
     for family in ["regular", "centroid-split", "minimum-angle-30"] {
-        let found = rate(family, &stabilised);
-        assert!((1.85..2.5).contains(&found), "{family}: rate {found}");
+        for relaxation in ["linear", "quadratic"] {
+            let mut settings = stabilised.clone();
+            settings["relaxation"] = json!(relaxation);
+            let found = rate(family, &settings);
+            assert!((1.85..2.5).contains(&found), "{family}, {relaxation}: rate {found}");
+        }
     }
     // 2.00 and 0.16 by the independent program.
     assert!((rate("regular", &region) - 2.0).abs() < 0.05);
@@ -219,7 +225,7 @@ fn known_signs_are_the_default_and_pivoting_answers_where_they_fail() {
         )
     };
     for curve in ["stabilised", "first-order-ring", "second-order-ring"] {
-        let settings = json!({ "equation": "triharmonic", "condition": "curve", "curve": curve, "system": "mixed" });
+        let settings = json!({ "equation": "triharmonic", "condition": "curve", "curve": curve });
         let outcome = solve(settings).expect("a solution");
         assert!(outcome.reason.contains("ldlt"), "{curve}: {}", outcome.reason);
         assert_eq!(outcome.counters["fallbacks"], 0);

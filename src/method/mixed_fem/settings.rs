@@ -1,7 +1,7 @@
 //! The settings of a mixed finite element computation in the typed form that it reads.
 
 use super::fields::FIELDS;
-use super::scheme::{Mass, Scheme};
+use super::scheme::{Mass, Relaxation, Scheme};
 use crate::method::Failure;
 use crate::method::setting::fill;
 use serde::{Deserialize, Serialize};
@@ -131,6 +131,7 @@ pub struct Settings {
     pub equation: Equation,
     pub condition: Condition,
     pub curve: Curve,
+    pub relaxation: Relaxation,
     pub stabilisation: f64,
     pub mass: Mass,
     pub system: System,
@@ -189,7 +190,7 @@ impl Settings {
         match self.system {
             System::OneField => true,
             System::Mixed => false,
-            System::Auto => self.has_one_field() && matches!(self.solver, Solver::Auto | Solver::Cholesky),
+            System::Auto => self.has_one_field() && self.solver == Solver::Cholesky,
         }
     }
 
@@ -208,7 +209,7 @@ impl Settings {
             drop(&["curve"]);
         }
         if scheme != Scheme::Stabilised {
-            drop(&["stabilisation"]);
+            drop(&["relaxation", "stabilisation"]);
         }
         if scheme != Scheme::Unstabilised {
             drop(&["on_singular"]);

@@ -224,6 +224,7 @@ fn solve(
         scheme,
         settings.order(),
         settings.mass,
+        settings.relaxation,
         settings.stabilisation,
         data,
     )?;

@@ -89,6 +89,7 @@ pub(super) fn run(mut model: Model, settings: &Settings, observer: &mut dyn Obse
             scheme,
             order,
             settings.mass,
+            settings.relaxation,
             settings.stabilisation,
             &data,
         )?;

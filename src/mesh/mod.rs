@@ -9,6 +9,7 @@ pub mod split;
 pub mod check;
 pub mod quadrilateral;
 pub mod mixed;
+pub mod curved;
 pub mod summary;
 pub mod linear_map;
 pub mod surface;

@@ -5,6 +5,7 @@
 //! that the file is valid XML, every number keeps its bits, and the same content gives the same bytes.
 //! Source: the VTK user's guide, 11th edition, section 19.3, "XML file formats".
 
+pub mod curved;
 mod file;
 mod write;
 

@@ -448,5 +448,6 @@ pub fn run(problem: &Problem, settings: &Settings, observer: &mut dyn Observer) 
         counters: built.counters,
         notices: built.notices,
         mesh: Some(mesh),
+        files: Default::default(),
     })
 }

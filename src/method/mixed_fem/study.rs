@@ -391,6 +391,7 @@ impl Report {
             counters: self.counters,
             notices: self.notices,
             mesh: Some(mesh),
+            files: Default::default(),
             ..Outcome::default()
         }
     }

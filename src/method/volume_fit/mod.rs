@@ -676,6 +676,7 @@ impl<'a> Fit<'a> {
             counters: std::mem::take(&mut self.counters),
             notices: std::mem::take(&mut self.notices),
             mesh: Some(picture),
+            files: Default::default(),
         })
     }
 }

@@ -5,7 +5,8 @@
 
 use super::objective::{FitObjective, Parts};
 use super::surface_energy::SurfaceEnergy;
-use super::{Fit, invalid};
+use super::fit::Fit;
+use super::invalid;
 use crate::energy::mapping::Density;
 use crate::energy::untangling::Untangling;
 use crate::fem::boundary::Boundary;

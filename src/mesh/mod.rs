@@ -14,6 +14,7 @@ pub mod summary;
 pub mod linear_map;
 pub mod surface;
 pub mod catmull_clark;
+pub mod multilinear_averaging;
 pub mod generate;
 pub mod planar;
 pub mod band;

@@ -3,6 +3,7 @@
 use super::settings::{Settings, Stage};
 use super::surface_energy::Scale;
 use super::target::Target;
+use super::template::{Template, transform};
 use super::objective::Parts;
 use super::{COUNTERS, adaptivity, invalid, quality, untangle, validity};
 use crate::energy::mapping::Density;
@@ -46,12 +47,16 @@ pub(super) struct Fit<'a> {
 
 impl<'a> Fit<'a> {
     pub(super) fn new(
-        mut volume: MixedMesh,
+        template: Template,
         mut target: Target,
         settings: &'a Settings,
         mut notices: Vec<String>,
     ) -> Result<Fit<'a>, Failure> {
         notices.append(&mut target.notices);
+        let Template {
+            mesh: mut volume,
+            mut map,
+        } = template;
         let points = if target.surface.points.is_empty() {
             &target.sites
         } else {
@@ -69,13 +74,18 @@ impl<'a> Fit<'a> {
             &mut target.surface.points,
             &mut target.clean.points,
             &mut target.sites,
-            &mut volume.points,
         ];
         for list in lists {
             for point in list {
                 *point = std::array::from_fn(|axis| (point[axis] - middle[axis]) / unit);
             }
         }
+        transform(
+            &mut volume,
+            &mut map,
+            [1.0 / unit; 3],
+            middle.map(|coordinate| -coordinate / unit),
+        );
         target.place_sites();
         let topology = volume.topology().map_err(invalid)?;
         let template_surface = topology.boundary_triangles(&volume.points);
@@ -93,8 +103,26 @@ impl<'a> Fit<'a> {
             .map(|(shape, _)| crate::fem::batches::reference_volume(shape, &crate::fem::batches::unit_reference(shape)))
             .sum();
         let first = settings.stages[0].order;
-        let space = Space::new(&volume, &topology, settings.basis, &vec![first; volume.cells()]).map_err(invalid)?;
-        let x = space.linear(&volume.points);
+        let (space, x) = match map {
+            None => {
+                let orders = vec![first; volume.cells()];
+                let space = Space::new(&volume, &topology, settings.basis, &orders).map_err(invalid)?;
+                let x = space.linear(&volume.points);
+                (space, x)
+            }
+            Some(map) if map.basis.name() == settings.basis.name() => {
+                let space = Space::new(&volume, &topology, settings.basis, &map.orders).map_err(invalid)?;
+                (space, map.x)
+            }
+            Some(map) => {
+                return Err(invalid(format!(
+                    "the template's coefficients belong to the basis {}, the job's is {}; set basis = \"{}\"",
+                    map.basis.name(),
+                    settings.basis.name(),
+                    map.basis.name()
+                )));
+            }
+        };
         Ok(Fit {
             settings,
             size: (scale.volume / unit_volume).cbrt(),

@@ -13,13 +13,16 @@ pub mod adaptivity;
 pub mod metrics;
 pub mod model;
 pub mod objective;
+pub mod chart;
 pub mod distances;
+pub mod files;
 mod fit;
 pub mod outcome;
 pub mod picture;
 pub mod preconditioner;
 pub mod quality;
 pub mod settings;
+pub mod shapes;
 mod stage;
 pub mod surface_energy;
 pub mod target;
@@ -87,19 +90,19 @@ impl Method for VolumeFit {
         let part = |role: &str| inputs.model.parts.get(role);
         let template_part = part("template")
             .ok_or_else(|| invalid("the model has no `template`; give it a file or a generator".to_string()))?;
-        let (volume, target) = match part("target") {
+        let (template, target) = match part("target") {
             Some(part) => {
                 let target = target::read(part)?;
                 (template::read(template_part, Some(&target), &mut notices)?, target)
             }
             None => {
-                let volume = template::read(template_part, None, &mut notices)?;
-                let topology = volume.topology().map_err(invalid)?;
-                let target = target::of_boundary(topology.boundary_triangles(&volume.points));
-                (volume, target)
+                let template = template::read(template_part, None, &mut notices)?;
+                let topology = template.mesh.topology().map_err(invalid)?;
+                let target = target::of_boundary(topology.boundary_triangles(&template.mesh.points));
+                (template, target)
             }
         };
-        let mut fit = Fit::new(volume, target, &settings, notices)?;
+        let mut fit = Fit::new(template, target, &settings, notices)?;
         fit.run(observer)
     }
 }

@@ -272,6 +272,10 @@ static KIND: LazyLock<ModelKind> = LazyLock::new(|| {
         ),
         shape("bone", vec![], "A shaft with two thick ends, smooth."),
         shape("tooth", vec![], "A rounded block with four cusps on top, smooth."),
+        shape("hanger", vec![], "A flat ring with a hook: smooth, of genus 1."),
+        shape("hand", vec![], "A palm with a thumb and four fingers, smooth."),
+        shape("relief", vec![], "A slab with a hill and waves on top, smooth."),
+        shape("figure", vec![], "A body with legs, arms and a head, smooth."),
     ];
     ModelKind {
         roles: keep(vec![

@@ -104,6 +104,7 @@ impl Fit<'_> {
             ),
             ("element", (0..cells).map(|cell| cell as f64).collect()),
         ];
+        let files = self.files(&given, &fields)?;
         let picture = picture::picture(&self.space, &self.references, &given, &self.volume, &fields)?;
         let traces: Traces = TRACES
             .iter()
@@ -122,7 +123,7 @@ impl Fit<'_> {
             counters: std::mem::take(&mut self.counters),
             notices: std::mem::take(&mut self.notices),
             mesh: Some(picture),
-            files: Default::default(),
+            files,
         })
     }
 }

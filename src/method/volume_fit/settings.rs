@@ -1,5 +1,6 @@
 //! The settings of a volume fit: their declaration as data, and the typed form that the computation reads.
 
+use super::files::FILES;
 use crate::energy;
 use crate::fem::basis;
 use crate::fem::quadrature::{RULES, Rule};
@@ -31,6 +32,9 @@ const ORDER: Kind = Kind::Integer {
     min: 1,
     max: HIGHEST_ORDER as i64,
 };
+
+/// A file of the result.
+static FILE: Kind = Kind::Choice(FILES);
 
 /// A stage of the schedule.
 static STAGE: &[Field] = &[
@@ -250,6 +254,13 @@ pub static FIELDS: &[Field] = &[
         doc: "How often, at most, a fit with elements that are invalid between quadrature points is gone on with, with more \
               points. Preset best: 3, paper: 0.",
     },
+    Field {
+        name: "files",
+        kind: Kind::List(&FILE),
+        default: Default::Absent,
+        doc: "Files beside the picture: lagrange, gmsh, coefficients. All when absent and there are at most 300000 nodes, else \
+              the coefficients alone.",
+    },
 ];
 
 /// A stage.
@@ -287,6 +298,8 @@ pub struct Settings {
     pub change_tolerance: f64,
     pub untangle: bool,
     pub repairs: usize,
+    /// Nothing when the file leaves it open.
+    pub files: Option<Vec<String>>,
 }
 
 /// Raising single orders.
@@ -453,6 +466,10 @@ impl Settings {
                 .and_then(Value::as_f64)
                 .unwrap_or(if paper { 0.0 } else { 1e-5 }),
             untangle: flag("untangle"),
+            files: settings.get("files").and_then(Value::as_array).map(|names| {
+                let words = names.iter().filter_map(Value::as_str).map(str::to_owned);
+                words.collect()
+            }),
             repairs: whole("repairs").unwrap_or(if paper { 0 } else { 3 }),
         })
     }

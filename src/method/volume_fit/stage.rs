@@ -1,5 +1,6 @@
 //! One stage of a fit: L-BFGS with fixed orders and a fixed weight of the volume energy.
 
+use super::chart::Chart;
 use super::objective::{FitObjective, Parts};
 use super::preconditioner::{Model, Preconditioner};
 use super::settings::Stage;
@@ -72,8 +73,18 @@ impl Observer for Recorder<'_> {
 }
 
 impl Fit<'_> {
-    /// Minimizes with the present orders.
+    /// Minimizes with the present orders, over the nodes.
     pub(super) fn stage(&mut self, stage: &Stage, observer: &mut dyn Observer) -> Result<(StopReason, String), Failure> {
+        self.stage_over(stage, None, observer)
+    }
+
+    /// Minimizes with the present orders, over the nodes or over unknowns that stand for them.
+    pub(super) fn stage_over(
+        &mut self,
+        stage: &Stage,
+        mut chart: Option<(&Chart, &mut Vec<f64>)>,
+        observer: &mut dyn Observer,
+    ) -> Result<(StopReason, String), Failure> {
         observer.phase(&format!("stage {}", self.stages));
         let settings = self.settings;
         self.lambda = stage.lambda;
@@ -109,8 +120,10 @@ impl Fit<'_> {
         let mut previous = f64::INFINITY;
         // The energy when a round last ended for its small change.
         let mut settled = f64::INFINITY;
+        // The model of the Hessian is one of nodes.
+        let preconditioned = settings.preconditioned && chart.is_none();
         let outcome = loop {
-            let preconditioner = if settings.preconditioned {
+            let preconditioner = if preconditioned {
                 boundary.positions(&self.x, &mut samples);
                 let model = Model {
                     mesh: &self.volume,
@@ -131,7 +144,7 @@ impl Fit<'_> {
                 None
             };
             let left = stage.iterations - done;
-            let round = if settings.preconditioned {
+            let round = if preconditioned {
                 left.min(settings.refresh)
             } else {
                 left
@@ -147,6 +160,8 @@ impl Fit<'_> {
                 samples: Vec::new(),
                 forces: Vec::new(),
                 room: Vec::new(),
+                chart: chart.as_ref().map(|chart| chart.0),
+                nodes: Default::default(),
             };
             let lbfgs = Lbfgs {
                 stopping: Stopping {
@@ -172,9 +187,19 @@ impl Fit<'_> {
                 increases: &mut self.increases,
                 previous,
             };
-            let solution = lbfgs.minimize(&mut objective, std::mem::take(&mut self.x), &mut recorder);
+            let start = match &mut chart {
+                Some((_, unknowns)) => std::mem::take(*unknowns),
+                None => std::mem::take(&mut self.x),
+            };
+            let solution = lbfgs.minimize(&mut objective, start, &mut recorder);
             previous = solution.value;
-            self.x = solution.x;
+            match &mut chart {
+                Some((chart, unknowns)) => {
+                    chart.expand(&solution.x, &mut self.x);
+                    **unknowns = solution.x;
+                }
+                None => self.x = solution.x,
+            }
             done += solution.counters.iterations;
             self.count("iterations", solution.counters.iterations);
             self.count("evaluations", solution.counters.evaluations);
@@ -193,6 +218,7 @@ impl Fit<'_> {
                 // The parts at the accepted point, not at the last one tried.
                 let mut gradient = vec![0.0; self.x.len()];
                 use crate::optimize::Objective as _;
+                objective.chart = None;
                 objective.gradient(&self.x, &mut gradient);
                 self.last = latest.get();
                 let reason = if solution.stop == StopReason::StepLimit {

@@ -78,6 +78,8 @@ pub(super) fn untangle(fit: &mut Fit<'_>, observer: &mut dyn Observer) -> Result
             samples: Vec::new(),
             forces: Vec::new(),
             room: Vec::new(),
+            chart: None,
+            nodes: Default::default(),
         };
         let lbfgs = Lbfgs {
             stopping: Stopping {

@@ -5,8 +5,8 @@ use crate::mesh::curved::{CurvedMesh, corner_points, edge_points, peeled_cell, p
 use crate::mesh::mixed::Shape;
 use std::collections::BTreeMap;
 
-/// The highest order that VTK's Lagrange cells are made for.
-pub const HIGHEST_ORDER: usize = 10;
+/// The highest order: VTK 9.7 evaluates Lagrange cells up to it without loss.
+pub const HIGHEST_ORDER: usize = 16;
 
 /// VTK's number of a shape's Lagrange cell.
 fn code(shape: Shape) -> u8 {

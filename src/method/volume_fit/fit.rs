@@ -1,13 +1,14 @@
 //! A fit under way: the map, what it is fitted to, and the order of its stages.
 
+use super::shell::{self, Shell};
 use super::settings::{Settings, Stage};
 use super::surface_energy::Scale;
 use super::target::Target;
 use super::template::{Template, transform};
 use super::objective::Parts;
-use super::{COUNTERS, adaptivity, invalid, quality, untangle, validity};
+use super::{COUNTERS, adaptivity, invalid, quality, subdivision, untangle, validity};
 use crate::energy::mapping::Density;
-use crate::fem::batches::{Batches, references_of_volume};
+use crate::fem::batches::{Batches, reference_volume, references_of_volume, unit_reference};
 use crate::fem::space::{Kind, Space};
 use crate::fem::volume_energy::VolumeEnergy;
 use crate::linalg::vector3::Columns;
@@ -24,6 +25,7 @@ pub(super) struct Fit<'a> {
     pub(super) volume: MixedMesh,
     pub(super) topology: Topology,
     pub(super) target: Target,
+    pub(super) shell: Option<Shell>,
     pub(super) references: Vec<Columns<f64>>,
     pub(super) reference_volume: f64,
     /// Edge of the references.
@@ -43,6 +45,8 @@ pub(super) struct Fit<'a> {
     pub(super) stages: usize,
     /// Quadrature points added a direction, after elements came out invalid between the points.
     pub(super) extra_points: usize,
+    /// Those of the present map, once they are known.
+    pub(super) certificates: Option<validity::Certificates>,
 }
 
 impl<'a> Fit<'a> {
@@ -56,6 +60,7 @@ impl<'a> Fit<'a> {
         let Template {
             mesh: mut volume,
             mut map,
+            mut shell,
         } = template;
         let points = if target.surface.points.is_empty() {
             &target.sites
@@ -86,6 +91,13 @@ impl<'a> Fit<'a> {
             [1.0 / unit; 3],
             middle.map(|coordinate| -coordinate / unit),
         );
+        if let Some(shell) = &mut shell {
+            shell.distance /= unit;
+            for column in shell.references.iter_mut().flatten() {
+                *column = column.map(|coordinate| coordinate / unit);
+            }
+            shell.surface.points.copy_from_slice(&volume.points[..shell.base]);
+        }
         target.place_sites();
         let topology = volume.topology().map_err(invalid)?;
         let template_surface = topology.boundary_triangles(&volume.points);
@@ -97,10 +109,20 @@ impl<'a> Fit<'a> {
         }
         check_target(&target, &mut notices)?;
         let scale = Scale::of(&target, &template_surface, own_volume);
-        let references = references_of_volume(volume.iter().map(|cell| cell.0), scale.volume);
+        let (references, whole) = match &shell {
+            None => {
+                let shapes = volume.iter().map(|cell| cell.0);
+                (references_of_volume(shapes, scale.volume), scale.volume)
+            }
+            Some(shell) => {
+                let volumes = volume.iter().zip(&shell.references);
+                let sum = volumes.map(|((shape, _), reference)| reference_volume(shape, reference)).sum();
+                (shell.references.clone(), sum)
+            }
+        };
         let unit_volume: f64 = volume
             .iter()
-            .map(|(shape, _)| crate::fem::batches::reference_volume(shape, &crate::fem::batches::unit_reference(shape)))
+            .map(|(shape, _)| reference_volume(shape, &unit_reference(shape)))
             .sum();
         let first = settings.stages[0].order;
         let (space, x) = match map {
@@ -125,8 +147,9 @@ impl<'a> Fit<'a> {
         };
         Ok(Fit {
             settings,
-            size: (scale.volume / unit_volume).cbrt(),
-            reference_volume: scale.volume,
+            size: (whole / unit_volume).cbrt(),
+            reference_volume: whole,
+            shell,
             volume,
             topology,
             target,
@@ -144,6 +167,7 @@ impl<'a> Fit<'a> {
             increases: 0,
             stages: 0,
             extra_points: 0,
+            certificates: None,
         })
     }
 
@@ -212,6 +236,14 @@ impl<'a> Fit<'a> {
                 ),
             });
         }
+        if let Some(shell) = self.shell.clone() {
+            (stop, reason) = shell::run(self, &shell, observer)?;
+            return self.finish(stop, reason, inverted_at_start, observer);
+        }
+        if self.settings.levels > 0 {
+            (stop, reason) = subdivision::run(self, self.settings.levels, observer)?;
+            return self.finish(stop, reason, inverted_at_start, observer);
+        }
         let stages = self.settings.stages.clone();
         for stage in stages {
             let orders: Vec<usize> = self.space.orders.iter().map(|&order| order.max(stage.order)).collect();
@@ -251,6 +283,7 @@ impl<'a> Fit<'a> {
                 .filter(|verdict| **verdict == validity::Judged::Fails)
                 .count();
             if failing == 0 {
+                self.certificates = Some(certificates);
                 break;
             }
             self.extra_points += 3;

@@ -1,7 +1,7 @@
 //! What is reported of a fit: metrics, traces, the picture and the files.
 
 use super::fit::Fit;
-use super::{TRACES, distances, invalid, picture, quality, validity};
+use super::{TRACES, distances, invalid, picture, quality, shell, validity};
 use crate::fem::space::Space;
 use crate::method::{Failure, Outcome, Traces};
 use crate::optimize::{Observer, StopReason};
@@ -26,9 +26,18 @@ impl Fit<'_> {
             &self.target,
             &mut metrics,
         )?;
+        for name in ["thickness_error_mean", "thickness_error_rms", "thickness_error_max"] {
+            metrics.insert(name.to_string(), f64::NAN);
+        }
+        if let Some(shell) = &self.shell {
+            shell::measure(shell, &self.x, &mut metrics);
+        }
         let cells = self.volume.cells();
         let flags: Vec<bool> = quality.least_determinant.iter().map(|det| !(*det > 0.0)).collect();
-        let certificates = validity::certify(&self.space, &self.references, &self.x, observer);
+        let certificates = match self.certificates.take() {
+            Some(known) => known,
+            None => validity::certify(&self.space, &self.references, &self.x, observer),
+        };
         let mut set = |name: &str, value: f64| {
             metrics.insert(name.to_string(), value);
         };

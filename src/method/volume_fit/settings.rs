@@ -255,6 +255,19 @@ pub static FIELDS: &[Field] = &[
               points. Preset best: 3, paper: 0.",
     },
     Field {
+        name: "subdivision_levels",
+        kind: Kind::Integer { min: 0, max: 6 },
+        default: Default::Integer(0),
+        doc: "Fit a subdivision volume: the control points of so many levels of multi-linear averaging, level by level, with \
+              trilinear hexahedra; 0 fits elements. Needs order 1.",
+    },
+    Field {
+        name: "crease_angle",
+        kind: Kind::Number { min: 0.0, max: 180.0 },
+        default: Default::Number(40.0),
+        doc: "Edges of a subdivision's template bent by more than this, in degrees, stay creases; 180 keeps none.",
+    },
+    Field {
         name: "files",
         kind: Kind::List(&FILE),
         default: Default::Absent,
@@ -298,6 +311,8 @@ pub struct Settings {
     pub change_tolerance: f64,
     pub untangle: bool,
     pub repairs: usize,
+    pub levels: usize,
+    pub crease_angle: f64,
     /// Nothing when the file leaves it open.
     pub files: Option<Vec<String>>,
 }
@@ -422,6 +437,13 @@ impl Settings {
                 stage.order
             )));
         }
+        let levels = number("subdivision_levels") as usize;
+        if let Some(stage) = stages.iter().find(|stage| levels > 0 && stage.order > 1) {
+            return Err(invalid(format!(
+                "a subdivision volume has trilinear hexahedra; order is {}, set order = 1",
+                stage.order
+            )));
+        }
         let energy = energy::find(&text("energy")).filter(|energy| energy.is_barrier());
         let basis = basis::find(&chosen("basis"));
         let rule = RULES.iter().find(|rule| rule.0 == chosen("quadrature"));
@@ -466,6 +488,8 @@ impl Settings {
                 .and_then(Value::as_f64)
                 .unwrap_or(if paper { 0.0 } else { 1e-5 }),
             untangle: flag("untangle"),
+            levels,
+            crease_angle: number("crease_angle"),
             files: settings.get("files").and_then(Value::as_array).map(|names| {
                 let words = names.iter().filter_map(Value::as_str).map(str::to_owned);
                 words.collect()
@@ -529,6 +553,9 @@ fn default_schedule(
 /// Checks that go across fields.
 pub fn check(settings: &Value) -> Vec<(String, String)> {
     match Settings::resolve(settings) {
+        Err(failure) if settings.get("subdivision_levels").and_then(Value::as_u64).unwrap_or(0) > 0 => {
+            vec![("subdivision_levels".to_string(), failure.reason)]
+        }
         Err(failure) if settings.get("schedule").is_some() => vec![("schedule".to_string(), failure.reason)],
         _ => Vec::new(),
     }

@@ -100,7 +100,8 @@ impl Fit<'_> {
         let boundary = Boundary::new(&self.volume, &self.topology, &self.space, self.intervals(order));
         let mut samples = Vec::new();
         boundary.positions(&self.x, &mut samples);
-        let mut surface = if settings.terms.to_target || settings.terms.from_target {
+        let fitted = self.shell.is_none() && (settings.terms.to_target || settings.terms.from_target);
+        let mut surface = if fitted {
             let energy = SurfaceEnergy::new(
                 &samples,
                 &boundary.triangles,

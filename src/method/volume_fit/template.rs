@@ -1,5 +1,6 @@
 //! The template: read or generated, shaped by its recipe, laid into the target.
 
+use super::shell::{self, Shell};
 use super::target::Target;
 use crate::fem::basis::Basis;
 use crate::fem::coefficient_file;
@@ -27,6 +28,7 @@ const MOST_CELLS: usize = 4_000_000;
 /// `invalid-input` for a file that holds no volume, a recipe that cannot be followed, or a mesh that is not valid.
 pub fn read(part: &Part, target: Option<&Target>, notices: &mut Vec<String>) -> Result<Template, Failure> {
     let mut map = None;
+    let mut shell = None;
     let (mut mesh, parameters, generated) = match part {
         Part::Generated { generator, parameters } => {
             let count =
@@ -49,6 +51,18 @@ pub fn read(part: &Part, target: Option<&Target>, notices: &mut Vec<String>) -> 
                     };
                     voxels::voxels(&target.surface, count("along", 8)).map_err(invalid)?
                 }
+                "shell" => {
+                    let Some(target) = target else {
+                        return Err(invalid("a shell needs a target surface to grow on".to_string()));
+                    };
+                    let percent = parameters.get("distance").and_then(Value::as_f64).unwrap_or(2.0);
+                    let side = parameters.get("side").and_then(Value::as_str).unwrap_or("both");
+                    let distance = 0.01 * percent * diagonal(&target.surface.points);
+                    let (mesh, grown) =
+                        shell::grow(&target.surface, distance, count("layers", 2), side).map_err(invalid)?;
+                    shell = Some(grown);
+                    mesh
+                }
                 name => {
                     let mut table = parameters.clone();
                     if let Some(table) = table.as_object_mut() {
@@ -63,7 +77,7 @@ pub fn read(part: &Part, target: Option<&Target>, notices: &mut Vec<String>) -> 
                     }
                 }
             };
-            (mesh, parameters, generator != "voxels")
+            (mesh, parameters, generator != "voxels" && generator != "shell")
         }
         Part::File {
             name,
@@ -112,7 +126,7 @@ pub fn read(part: &Part, target: Option<&Target>, notices: &mut Vec<String>) -> 
         )
         .map_err(invalid)?;
     }
-    Ok(Template { mesh, map })
+    Ok(Template { mesh, map, shell })
 }
 
 /// A template: its cells, and the map over them where they are curved.
@@ -120,6 +134,8 @@ pub fn read(part: &Part, target: Option<&Target>, notices: &mut Vec<String>) -> 
 pub struct Template {
     pub mesh: MixedMesh,
     pub map: Option<Map>,
+    /// What the cells strive for where they are layers on a surface.
+    pub shell: Option<Shell>,
 }
 
 /// A map over a template as a coefficient file gives it.

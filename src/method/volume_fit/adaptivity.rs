@@ -6,7 +6,8 @@
 
 use super::settings::Adaptive;
 use super::surface_energy::SurfaceEnergy;
-use super::{Fit, invalid};
+use super::fit::Fit;
+use super::invalid;
 use crate::fem::boundary::Boundary;
 use crate::fem::space::Space;
 use crate::method::Failure;

@@ -6,6 +6,7 @@
 //! Source: the VTK user's guide, 11th edition, section 19.3, "XML file formats".
 
 mod bezier;
+pub mod curved;
 mod file;
 mod write;
 

@@ -120,9 +120,9 @@ fn patches_meet_along_creases_and_are_smooth_elsewhere() {
             assert!(metric("crease_gap") < 1e-15 && metric("gap") < 1e-15, "{name}");
             assert!(metric("curve_tangency") < 1e-14, "{name}");
             assert!(
-                (metric("crease_angle") - angle).abs() < 15.0,
+                (metric("crease_turn") - angle).abs() < 15.0,
                 "{name}: {}",
-                metric("crease_angle")
+                metric("crease_turn")
             );
             assert!(metric("distance_max") < 0.02, "{name}: {}", metric("distance_max"));
             assert_eq!(metric("folded"), 0.0, "{name}");
@@ -186,12 +186,27 @@ fn creases_come_from_angles_lists_and_labels() {
         .expect_err("no normals")
         .reason;
     assert!(without.contains("crease_normals needs"), "{without}");
+    // Corner normals that are summed, and given normals that creases replace, are told.
+    let told = |settings: Value, word: &str| {
+        let outcome = run(&[("mesh", file("box.obj", &corners))], settings).expect("a box");
+        assert!(
+            outcome.notices.iter().any(|notice| notice.contains(word)),
+            "{word}: {:?}",
+            outcome.notices
+        );
+    };
+    told(json!({ "tessellation": 1 }), "at 8 vertices, the first is vertex 0");
+    told(json!({ "tessellation": 1 }), "12 edges are sharper than 60 degrees");
+    told(
+        json!({ "crease_angle": 30.0, "tessellation": 1 }),
+        "given at 8 vertices on creases",
+    );
     // With one normal a vertex for all walls, their creases with the top would run on around its corners.
     let ring = "0 1\n1 2\n2 3\n3 0\n4 5\n5 6\n6 7\n7 4\n";
 
     let reason = |parts: &[(&str, Part)], settings: Value| run(parts, settings).expect_err("bad input").reason;
     let with = |list: &str| [("mesh", file("box.obj", BOX)), ("creases", file("list.txt", list))];
-    assert!(reason(&with(ring), json!({})).contains("leave in one line"));
+    assert!(reason(&with(ring), json!({})).contains("may not turn within one quadrilateral"));
     assert!(reason(&with("0 1\n0 6\n"), json!({})).contains("vertices 0 and 6"));
     assert!(reason(&with("0 1\n0 8\n"), json!({})).contains("line 2: `8`"));
     assert!(reason(&with("0 1 2\n"), json!({})).contains("line 1: 3 words"));
@@ -209,7 +224,7 @@ fn a_crease_is_perpendicular_to_the_normals_of_both_sides() {
         .parts
         .insert("mesh".to_string(), generated("cube", json!({ "cells": 2 })));
     let settings = Settings::resolve(&json!({})).expect("defaults");
-    let problem = Problem::new(&model, &settings).expect("a cube");
+    let problem = Problem::new(&model, &settings, &Silent).expect("a cube");
     let creases = problem.creases.as_ref().expect("creases");
     let (network, notices) = vargeo::method::g1_surface::network::Network::creased(
         &problem.mesh,

@@ -355,6 +355,12 @@ fn folded_patches_are_repaired() {
     let left = json!({ "edge_normals": "local", "repair": false, "tessellation": 1 });
     let folded = run(saddle(), left).expect("a surface");
     assert!(folded.metrics["folded"] > 0.0 && folded.metrics["normal_slope"] > 10.0);
+    assert!(
+        folded.stop == "folded" && folded.reason.contains("the first is patch"),
+        "{}: {}",
+        folded.stop,
+        folded.reason
+    );
     let repaired = run(saddle(), json!({ "edge_normals": "local", "tessellation": 1 })).expect("a surface");
     assert!(repaired.counters["repairs"] > 0);
     assert_eq!(repaired.metrics["folded"], 0.0);
@@ -364,6 +370,211 @@ fn folded_patches_are_repaired() {
     );
     assert!(repaired.metrics["distance_max"] < 0.1 * folded.metrics["distance_max"]);
     assert!(repaired.notices.is_empty(), "{:?}", repaired.notices);
+    assert_eq!(repaired.stop, "converged");
+    // A corner that is turned over cannot be repaired.
+    let dent = "v 0 0 0\nv 1 0 0\nv 0.2 0.2 0\nv 0 1 0\nvn 0 0 1\nf 1//1 2//1 3//1 4//1\n";
+    let left = run(file(dent), json!({})).expect("a folded surface");
+    assert_eq!(left.stop, "folded", "{}", left.reason);
+    assert!(
+        left.reason
+            .contains("patch 0 over the quadrilateral with vertices [0, 1, 2, 3]"),
+        "{}",
+        left.reason
+    );
+    assert!(
+        left.notices.iter().any(|notice| notice.contains("still fold after")),
+        "{:?}",
+        left.notices
+    );
+}
+
+#[test]
+fn normals_that_disagree_do_not_converge() {
+    let paper = run(
+        generated("ellipsoid", json!({ "cells": 3 })),
+        json!({ "preset": "paper", "tessellation": 1 }),
+    );
+    let paper = paper.expect("a surface");
+    assert!(paper.metrics["angle_max"] > 1e-3);
+    assert!(
+        paper.stop == "stalled" && paper.reason.contains("natural cubics"),
+        "{}",
+        paper.reason
+    );
+    // The tolerance says nothing about a network that is too large for singular values.
+    let settings = json!({ "preset": "paper", "rank_tolerance": 1e-3, "tessellation": 1 });
+    for (cells, told) in [(3, false), (6, true)] {
+        let outcome = run(generated("ellipsoid", json!({ "cells": cells })), settings.clone()).expect("a surface");
+        let notices = &outcome.notices;
+        assert_eq!(
+            notices.iter().any(|notice| notice.contains("rank_tolerance")),
+            told,
+            "{notices:?}"
+        );
+    }
+}
+
+/// A generated mesh as the text of an OBJ file with normals, scaled, then shifted.
+fn written(mesh: &QuadrilateralMesh, scale: f64, shift: f64) -> String {
+    let mut text = String::new();
+    for point in &mesh.points {
+        let [x, y, z] = point.map(|coordinate| scale * coordinate + shift);
+        text.push_str(&format!("v {x:?} {y:?} {z:?}\n"));
+    }
+    for [x, y, z] in mesh.normals.as_ref().expect("normals") {
+        text.push_str(&format!("vn {x:?} {y:?} {z:?}\n"));
+    }
+    for quad in &mesh.quads {
+        let words = quad.map(|vertex| format!("{0}//{0}", vertex + 1));
+        text.push_str(&format!("f {}\n", words.join(" ")));
+    }
+    text
+}
+
+#[test]
+fn place_and_size_do_not_matter() {
+    let mesh = generate_surface("ellipsoid", &small("ellipsoid")).expect("valid").mesh;
+    let settings = json!({ "export": ["control-points"], "tessellation": 2 });
+    let base = run(file(&written(&mesh, 1.0, 0.0)), settings.clone()).expect("a surface");
+    for (scale, shift, tolerance) in [
+        (1.0, 1e6, 1e-8),
+        (1e-9, 0.0, 1e-10),
+        (1e9, 0.0, 1e-10),
+        (1e-3, -1e3, 1e-8),
+    ] {
+        let outcome = run(file(&written(&mesh, scale, shift)), settings.clone()).expect("a surface");
+        let metric = |name: &str| outcome.metrics[name];
+        assert_eq!(outcome.stop, "converged", "{}", outcome.reason);
+        assert!(
+            metric("angle_max") <= 1e-10,
+            "scale {scale}, shift {shift}: {}",
+            metric("angle_max")
+        );
+        for (name, power) in [
+            ("area", 2),
+            ("curve_energy", 2),
+            ("node_energy", 2),
+            ("edge_length", 1),
+            ("curvature_energy", 0),
+        ] {
+            let ratio = metric(name) / base.metrics[name] / scale.powi(power);
+            assert!(
+                (ratio - 1.0).abs() < tolerance,
+                "{name}, scale {scale}, shift {shift}: {ratio}"
+            );
+        }
+        // The corners of patches are those of the faces, in their order.
+        let text = String::from_utf8(outcome.files["control-points.txt"].clone()).expect("text");
+        let nets = control_net::parse(&text).expect("what was written");
+        for (net, quad) in nets.iter().zip(&mesh.quads) {
+            for (place, &vertex) in [0, 20, 24, 4].into_iter().zip(quad) {
+                let corner = mesh.points[vertex as usize].map(|coordinate| scale * coordinate + shift);
+                assert!(length(subtract(net[place], corner)) <= 1e-15 * (shift.abs() + scale) * 4.0);
+            }
+        }
+        let drawn = format::read("mesh.vtu", &outcome.mesh.expect("a mesh")).expect("a mesh");
+        let far = drawn
+            .points
+            .iter()
+            .map(|point| length(point.map(|coordinate| coordinate - shift)));
+        let far = far.fold(0.0, f64::max);
+        assert!(far > 0.9 * scale && far < 4.0 * scale, "{far}");
+    }
+}
+
+#[test]
+fn every_part_is_turned_by_its_own_normals() {
+    let text = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 5 0 0\nv 6 0 0\nv 6 1 0\nv 5 1 0\nvn 0 0 1\nvn 0 0 -1\n\
+                f 1//1 2//1 3//1 4//1\nf 5//2 6//2 7//2 8//2\n";
+    let outcome = run(file(text), json!({ "tessellation": 1 })).expect("two patches");
+    assert_eq!(
+        (outcome.stop.as_str(), outcome.metrics["folded"]),
+        ("converged", 0.0),
+        "{}",
+        outcome.reason
+    );
+    assert!(
+        outcome.notices.iter().any(|notice| notice.contains("4 of 8 vertices")),
+        "{:?}",
+        outcome.notices
+    );
+}
+
+#[test]
+fn middle_nodes_make_the_energy_least() {
+    let mesh = generate_surface("ellipsoid", &small("ellipsoid")).expect("valid").mesh;
+    for operator in [Operator::Laplacian, Operator::Printed] {
+        let network = network_of(&mesh);
+        let fitted = patch::continuous(&network, 5, operator);
+        // The integrand has degree 8 in either parameter: the rule is exact.
+        let energy = |change: [f64; 3]| -> f64 {
+            let mut patch = fitted.patch;
+            patch[patch::CENTRE] = std::array::from_fn(|axis| patch[patch::CENTRE][axis] + change[axis]);
+            let mut sum = 0.0;
+            for (u, weight) in patch::GAUSS_5 {
+                for (v, other) in patch::GAUSS_5 {
+                    let jet = surface::evaluate(&patch, &surface::Place::new(u), &surface::Place::new(v));
+                    let image: [f64; 3] = std::array::from_fn(|axis| {
+                        let mixed = if operator == Operator::Printed {
+                            jet.uv[axis]
+                        } else {
+                            0.0
+                        };
+                        jet.uu[axis] + mixed + jet.vv[axis]
+                    });
+                    sum += weight * other * dot(image, image);
+                }
+            }
+            sum
+        };
+        let least = energy([0.0; 3]);
+        assert!(
+            (least - fitted.energy[1]).abs() < 1e-12 * (1.0 + least),
+            "{least} and {:?}",
+            fitted.energy
+        );
+        for axis in 0..3 {
+            for step in [1.0, 0.1, 0.01] {
+                let mut change = [0.0; 3];
+                change[axis] = step;
+                let (up, down) = (
+                    energy(change) - least,
+                    energy(change.map(|component| -component)) - least,
+                );
+                // A parabola about its least value: both sides rise alike.
+                assert!(
+                    up > 0.0 && (up - down).abs() < 1e-9 * up + 1e-12,
+                    "step {step}: {up} and {down}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn twists_at_the_corners_follow_from_the_normals() {
+    let mesh = generate_surface("torus", &small("torus")).expect("valid").mesh;
+    let mut network = network_of(&mesh);
+    let patches = patches(&mut network);
+    let step = 1e-5;
+    for (patch, quad) in patches.iter().zip(&mesh.quads) {
+        // X_uv . n = -X_u . n_v with the patch's own unit normal, differentiated along the side v by differences.
+        let at = |u: f64, v: f64| surface::evaluate(patch, &surface::Place::new(u), &surface::Place::new(v));
+        let unit = |v: f64| {
+            let area = at(0.0, v).area_vector();
+            area.map(|component| component / length(area))
+        };
+        let here = at(0.0, 0.0);
+        let normal = network.normals[quad[0] as usize];
+        assert!(length(subtract(unit(0.0), normal)) < 1e-12);
+        let (one, two) = (unit(step), unit(2.0 * step));
+        let slope = std::array::from_fn(|axis| (4.0 * one[axis] - two[axis] - 3.0 * normal[axis]) / (2.0 * step));
+        let (twist, wanted) = (dot(here.uv, normal), -dot(here.u, slope));
+        assert!(
+            (twist - wanted).abs() < 1e-6 * (1.0 + wanted.abs()),
+            "{twist} and {wanted}"
+        );
+    }
 }
 
 #[test]
@@ -436,6 +647,9 @@ fn quads_by_dual_contouring_lie_on_their_surface() {
     assert!(metric("distance_max") < 0.05, "{}", metric("distance_max"));
     let open = with(contour(), generated("saddle", json!({})), json!({})).expect_err("open");
     assert!(open.reason.contains("the surface is open"), "{}", open.reason);
+    let fine = generated("dual-contouring", json!({ "cells": 512 }));
+    let many = with(fine, generated("sphere", json!({})), json!({})).expect_err("too many cubes");
+    assert!(many.reason.contains("cubes"), "{}", many.reason);
     let missing = run(contour(), json!({})).expect_err("no surface");
     assert!(
         missing.reason.contains("needs the model's `surface`"),
@@ -511,6 +725,20 @@ fn hexahedra_of_a_head_are_valid_and_fill_the_shell() {
         "{}",
         metric("hexahedra_volume")
     );
+    // Points are shared by number, wherever they lie: 6 * 12^2 + 2 on either side, whatever the signs of zeros.
+    let settings = json!({ "hexahedra": "outward", "tessellation": 6 });
+    let ellipsoid = generate_surface("ellipsoid", &json!({ "cells": 2 }))
+        .expect("valid")
+        .mesh;
+    for part in [
+        generated("ellipsoid", json!({ "cells": 2 })),
+        file(&written(&ellipsoid, 1.0, 1e6)),
+        file(&written(&ellipsoid, 1e-9, 0.0)),
+    ] {
+        let outcome = run(part, settings.clone()).expect("hexahedra");
+        let content = format::read("mesh.vtu", &outcome.mesh.expect("a mesh")).expect("a mesh");
+        assert_eq!((content.points.len(), content.hexahedra.len()), (2 * 866, 24 * 36));
+    }
     let failure = run(generated("saddle", json!({})), json!({ "hexahedra": "inward" })).expect_err("an open surface");
     assert!(failure.reason.contains("closed"), "{}", failure.reason);
 }
@@ -531,16 +759,28 @@ fn the_test_problem_converges_as_fast_as_the_geometry_allows() {
             patches(&mut network)
         };
         let exact = generated.exact.expect("a formula");
-        laplace_beltrami::solve(&patches, &network.quads, &network.connectivity, &exact, order)
-            .expect("a positive system")
-            .error
+        let solved = laplace_beltrami::solve(&patches, &network.quads, &network.connectivity, &exact, order)
+            .expect("a positive system");
+        (solved.error, solved.gradient_error)
     };
-    let rate = |facets: bool, order: usize| (error(4, facets, order) / error(8, facets, order)).log2();
+    let rates = |facets: bool, order: usize| {
+        let (coarse, fine) = (error(4, facets, order), error(8, facets, order));
+        ((coarse.0 / fine.0).log2(), (coarse.1 / fine.1).log2())
+    };
+    let rate = |facets: bool, order: usize| rates(facets, order).0;
+    // Gradients of functions of order p converge with p, but no faster than the geometry.
+    for (facets, order, expected) in [(true, 1, 1.0), (true, 3, 2.0), (false, 2, 2.0), (false, 3, 3.0)] {
+        let found = rates(facets, order).1;
+        assert!(
+            (found - expected).abs() < 0.4,
+            "facets {facets}, order {order}: {found}"
+        );
+    }
     assert!((rate(true, 1) - 2.0).abs() < 0.2, "facets, order 1: {}", rate(true, 1));
     assert!((rate(true, 3) - 2.0).abs() < 0.2, "facets, order 3: {}", rate(true, 3));
     assert!(rate(false, 2) > 2.7, "patches, order 2: {}", rate(false, 2));
     assert!(rate(false, 3) > 3.6, "patches, order 3: {}", rate(false, 3));
-    assert!(error(4, false, 3) < 0.1 * error(4, true, 3));
+    assert!(error(4, false, 3).0 < 0.1 * error(4, true, 3).0);
 }
 
 #[test]
@@ -582,5 +822,8 @@ fn what_cannot_be_used_is_named() {
     // The same square is fine as it is.
     let outcome = run(file(&text), json!({})).expect("a plane patch");
     assert_eq!(outcome.stop, "converged");
-    assert!(outcome.metrics["area"] - 1.0 < 1e-14);
+    assert!((outcome.metrics["area"] - 1.0).abs() < 1e-14);
+    let text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n".to_string();
+    let triangles = reason(text, json!({}));
+    assert!(triangles.contains("this is a triangle mesh") && triangles.contains("triangles = \"split\""));
 }

@@ -129,6 +129,7 @@ pub const STOPS: &[(&str, &str)] = &[
         "the problem has no admissible solution, with the obstacles named",
     ),
     ("invalid-input", "a model or a setting cannot be used"),
+    ("folded", "the result folds over itself, with the first place named"),
     (
         "singular",
         "the system of equations has no unique solution, with the places named",

@@ -47,7 +47,8 @@ pub(super) fn add_cell(sorter: &mut Sorter, code: i64, corners: &[u32]) -> Resul
         }
         21..=37 | 60..=81 => {
             return Err(format!(
-                "cells of type {code} ({}) are of higher order; only straight cells are read, write the mesh with order 1",
+                "cells of type {code} ({}) are of higher order; only straight cells are read; take a tessellation instead (the job's own `.vtu`, or \
+                 `tessellation.obj` by export = [\"obj\"]), or write the mesh with order 1",
                 higher_order(code)
             ));
         }

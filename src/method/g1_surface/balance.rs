@@ -14,6 +14,7 @@
 //! Guaranteed: tangents stay in the tangent planes. Not guaranteed: the least sum of all; that the conditions can be met:
 //! the residual tells.
 
+use super::continuity::larger;
 use super::edge_normals::Slopes;
 use super::hermite;
 use super::network::{Network, Spoke, in_plane};
@@ -295,7 +296,10 @@ impl State<'_> {
             .collect();
         let all = || corners.iter().copied().chain(own.iter().flatten().copied());
         let squares: f64 = all().map(|value| value * value).sum();
-        (squares.sqrt(), all().fold(0.0, |worst, value| worst.max(value.abs())))
+        (
+            squares.sqrt(),
+            all().fold(0.0, |worst, value| larger(worst, value.abs())),
+        )
     }
 }
 

@@ -1,17 +1,18 @@
 //! The stages of a surface, one after the other: curves, their tangents, normals along them, patches, repair of folds.
 
 use super::balance;
+use super::continuity::larger;
 use super::edge_normals::{self, Slopes};
 use super::enclosure;
 use super::hermite;
 use super::least_squares;
 use super::metrics;
 use super::network::Network;
-use super::outcome;
+use super::outcome::{self, Shape};
 use super::patch::{self, Fitted, Patch};
 use super::problem::{self, Problem};
 use super::repair::{Repaired, repair};
-use super::settings::{EdgeNormals, Geometry, Settings, Tangents};
+use super::settings::{EdgeNormals, Geometry, Patches, RANK_TOLERANCE, Settings, Tangents};
 use super::{COUNTERS, Failure};
 use crate::linalg::vector3::{dot, subtract};
 use crate::mesh::length;
@@ -27,13 +28,19 @@ pub struct Built {
     pub metrics: outcome::Metrics,
     pub counters: BTreeMap<String, u64>,
     pub notices: Vec<String>,
-    /// Whether everything came out as it should, and a sentence.
+    /// The word for a stop from outside.
+    stopped: Option<String>,
+    /// The residual of the conditions on tangents and normals, where it is too large.
+    unmet: Option<f64>,
+    /// Whether everything came out as it should, and a sentence; see [`Built::judge`].
     pub stop: String,
     pub reason: String,
 }
 
 /// Violations of the conditions above this show in the patches.
 pub(super) const MET: f64 = 1e-10;
+/// Angles between normals of neighbours, in degrees, that are no more than rounding.
+const AGREEING: f64 = 1e-8;
 
 /// Builds the patches of a problem.
 ///
@@ -73,8 +80,8 @@ struct Building {
     metrics: outcome::Metrics,
     counters: BTreeMap<String, u64>,
     notices: Vec<String>,
-    stop: String,
-    reason: String,
+    stopped: Option<String>,
+    unmet: Option<f64>,
 }
 
 impl Building {
@@ -99,18 +106,13 @@ impl Building {
                 .collect(),
             counters: COUNTERS.iter().map(|(name, _)| (name.to_string(), 0)).collect(),
             notices,
-            stop: "converged".to_string(),
-            reason: "the patches are built".to_string(),
+            stopped: None,
+            unmet: None,
         };
         building.count(problem);
         building.set("natural_energy", building.network.bending_energy());
         building.set("enclosure_natural", building.violation());
         Ok(building)
-    }
-
-    fn converged(&mut self) {
-        self.stop = "converged".to_string();
-        self.reason = "the patches are built".to_string();
     }
 
     fn set(&mut self, name: &str, value: f64) {
@@ -119,7 +121,9 @@ impl Building {
 
     fn violation(&self) -> f64 {
         let values = enclosure::violations(&self.network);
-        values.into_iter().fold(0.0, |worst: f64, value| worst.max(value.abs()))
+        values
+            .into_iter()
+            .fold(0.0, |worst: f64, value| larger(worst, value.abs()))
     }
 
     /// Counts of the mesh, and how well its curves and chords fit the tangent planes.
@@ -148,8 +152,8 @@ impl Building {
             for (end, &vertex) in ends.iter().enumerate() {
                 let normal = network.normals[vertex as usize];
                 let tangent = network.tangents[edge][end];
-                tangency = tangency.max(dot(tangent, normal).abs() / length(tangent));
-                chords = chords.max(dot(chord, normal).abs() / length(chord));
+                tangency = larger(tangency, dot(tangent, normal).abs() / length(tangent));
+                chords = larger(chords, dot(chord, normal).abs() / length(chord));
             }
         }
         self.set("curve_tangency", tangency);
@@ -178,17 +182,12 @@ impl Building {
         self.counters.insert("iterations".to_string(), iterations);
         self.counters.insert("factorizations".to_string(), factorizations);
         if let Some(why) = observer.stop() {
-            self.stop = match serde_json::to_value(why) {
+            self.stopped = Some(match serde_json::to_value(why) {
                 Ok(Value::String(word)) => word,
                 _ => "cancelled".to_string(),
-            };
-            self.reason = "stopped from outside before tangents and normals met their conditions".to_string();
+            });
         } else if !(residual < MET) {
-            self.stop = "stalled".to_string();
-            self.reason = format!(
-                "tangents and normals meet their conditions only to {residual:.1e}: normals of neighbouring patches differ by \
-                 about as much; smoother normals or fewer extreme corners would help"
-            );
+            self.unmet = Some(residual);
         }
         Ok(slopes)
     }
@@ -214,6 +213,20 @@ impl Building {
             (None, EdgeNormals::LeastSquares) => {
                 let solved = least_squares::solve(&self.network, settings.rank_tolerance).map_err(problem::invalid)?;
                 rank = solved.rank;
+                if rank.is_none() && settings.rank_tolerance != RANK_TOLERANCE {
+                    self.notices.push(format!(
+                        "rank_tolerance = {:e} is of no effect on more than {} curves: their normals are found by shifted steps, \
+                         which leave out singular values far below 1e-6 of the largest",
+                        settings.rank_tolerance,
+                        least_squares::DENSE
+                    ));
+                }
+                if let Some(change) = solved.unsettled {
+                    self.notices.push(format!(
+                        "the least squares for the normals did not settle: the last step changed them by {change:.1e}; \
+                         normal_residual and twist_residual tell how far the equations are met"
+                    ));
+                }
                 solved.slopes
             }
             (None, exact) => {
@@ -249,8 +262,8 @@ impl Building {
             self.counters.insert("repairs".to_string(), tries);
             self.tangent_change = self.tangent_change.max(change);
             self.notices.extend(notice);
-            if kept && self.stop == "stalled" {
-                self.converged();
+            if kept {
+                self.unmet = None;
             }
         }
         self.tell_curves();
@@ -258,7 +271,7 @@ impl Building {
         self.set("normal_residual", residuals.perpendicular);
         self.set("twist_residual", residuals.twist);
         self.set("normal_slope", residuals.largest);
-        let most = |value: fn(&Fitted) -> f64| fitted.iter().map(value).fold(0.0, f64::max);
+        let most = |value: fn(&Fitted) -> f64| fitted.iter().map(value).fold(0.0, larger);
         self.set("patch_residual", most(|patch| patch.residual));
         self.set("patch_change", most(|patch| patch.change));
         self.set("patch_rank_max", most(|patch| patch.rank as f64));
@@ -281,8 +294,63 @@ impl Building {
             metrics: self.metrics,
             counters: self.counters,
             notices: self.notices,
-            stop: self.stop,
-            reason: self.reason,
+            stopped: self.stopped,
+            unmet: self.unmet,
+            stop: "converged".to_string(),
+            reason: "the patches are built".to_string(),
+        }
+    }
+}
+
+impl Built {
+    /// Says how the construction ended, from what was measured on the patches.
+    pub fn judge(&mut self, problem: &Problem, settings: &Settings, shape: &Shape) {
+        let end = |built: &mut Self, stop: &str, reason: String| {
+            built.stop = stop.to_string();
+            built.reason = reason;
+        };
+        if let Some(word) = self.stopped.clone() {
+            let reason = "stopped from outside before tangents and normals met their conditions";
+            return end(self, &word, reason.to_string());
+        }
+        if let Some(first) = shape.first_folded {
+            let vertices = problem.whole().0.quads[first];
+            let reason = format!(
+                "{} of {} patches fold, the first is patch {first} over the quadrilateral with vertices {vertices:?} (counted \
+                 from 0): its normal turns against those of its corners; correct the normals there, or refine or smooth the mesh",
+                shape.folded,
+                self.patches.len()
+            );
+            return end(self, "folded", reason);
+        }
+        if settings.geometry != Geometry::G1 {
+            return;
+        }
+        let metric = |name: &str| self.metrics.get(name).copied().unwrap_or(f64::NAN);
+        let (angle, normal, twist) = (
+            shape.continuity.largest,
+            metric("normal_residual"),
+            metric("twist_residual"),
+        );
+        let why = if settings.tangents == Tangents::Natural {
+            "tangents of natural cubics do not meet the enclosure condition (tangents = \"enclosing\" do)"
+        } else if settings.edge_normals == EdgeNormals::LeastSquares || settings.patches == Patches::Collocation {
+            "least squares leave a part of the conditions open"
+        } else {
+            "smoother normals or fewer extreme corners would help"
+        };
+        if let Some(residual) = self.unmet {
+            let reason = format!(
+                "tangents and normals meet their conditions only to {residual:.1e}; normals of neighbouring patches differ by up \
+                 to {angle:.1e} degrees; {why}"
+            );
+            end(self, "stalled", reason);
+        } else if !(angle <= AGREEING && normal <= MET && twist <= MET) {
+            let reason = format!(
+                "normals of neighbouring patches differ by up to {angle:.1e} degrees; residual of the normals {normal:.1e}, of \
+                 the twists {twist:.1e}; {why}"
+            );
+            end(self, "stalled", reason);
         }
     }
 }
@@ -311,7 +379,7 @@ fn chord_distance(network: &Network) -> f64 {
             let share = (dot(from_start, chord) / square).clamp(0.0, 1.0);
             length(subtract(from_start, chord.map(|component| share * component)))
         });
-        away.fold(0.0, f64::max) / square.sqrt()
+        away.fold(0.0, larger) / square.sqrt()
     };
-    (0..network.tangents.len()).map(of_edge).fold(0.0, f64::max)
+    (0..network.tangents.len()).map(of_edge).fold(0.0, larger)
 }

@@ -3,7 +3,7 @@
 use super::evaluation::{Derivatives, Evaluated, Places, evaluate};
 use super::patch::Patch;
 use crate::linalg::processor::Processor;
-use crate::linalg::vector3::{cross, dot, subtract};
+use crate::linalg::vector3::{cross, dot, subtract, times};
 use crate::mesh::connectivity::NONE;
 use crate::mesh::length;
 use crate::mesh::quadrilateral::{Connectivity, Side, quad_and_corner};
@@ -42,8 +42,18 @@ impl Sides {
 }
 
 /// The larger of two numbers; not-a-number, from a patch without normal, must show.
-fn larger(a: f64, b: f64) -> f64 {
+pub fn larger(a: f64, b: f64) -> f64 {
     if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) }
+}
+
+/// A vector of length 1, so that products of two neither overflow nor vanish; zero stays zero.
+fn unit(vector: [f64; 3]) -> [f64; 3] {
+    let largest = vector.iter().fold(0.0, |most, component| larger(most, component.abs()));
+    if !(largest > 0.0) {
+        return vector;
+    }
+    let scaled = vector.map(|component| component / largest);
+    times(scaled, 1.0 / length(scaled))
 }
 
 /// Gap, largest angle and sum of the squares of the angles between two patches along their common edge, given as the side of
@@ -58,7 +68,7 @@ fn between(patches: &[Patch], both: [Side; 2], sides: &Sides, scratch: &mut [Eva
     for index in 0..SAMPLES {
         let [position, u, v] = scratch[0].first(index);
         let [other, other_u, other_v] = scratch[1].first(SAMPLES - 1 - index);
-        let (area, other_area) = (cross(u, v), cross(other_u, other_v));
+        let (area, other_area) = (unit(cross(u, v)), unit(cross(other_u, other_v)));
         found[0] = larger(found[0], length(subtract(position, other)));
         let (sine, cosine) = (length(cross(area, other_area)), dot(area, other_area));
         // Without a normal on either side both are zero.

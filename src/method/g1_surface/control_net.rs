@@ -1,16 +1,24 @@
 //! Patches as nets of 5 by 5 Bezier control points, for other programs: as text, as VTK's Bezier cells, as polyhedral nets.
 
+use super::frame::Frame;
 use super::patch::Patch;
 use super::surface;
 use crate::mesh::format::{Cells, vtu};
 use std::fmt::Write as _;
 
+/// The control points of all patches, in the coordinates of the file: point `5 i + j` for `B_i(u) B_j(v)` of degree 4. Patch
+/// `k` is face `k` of the mesh; its points 0, 20, 24, 4 are the corners of that face, in the face's order.
+pub fn of(patches: &[Patch], frame: &Frame) -> Vec<Patch> {
+    let mut nets: Vec<Patch> = patches.iter().map(surface::control_points).collect();
+    frame.leave(nets.as_flattened_mut());
+    nets
+}
+
 /// The control nets of all patches as a VTU file: 25 points a patch, `5 i + j` for `B_i(u) B_j(v)` of degree 4, and 16 quads.
-pub fn nets(patches: &[Patch]) -> Vec<u8> {
-    let points: Vec<[f64; 3]> = patches.iter().flat_map(surface::control_points).collect();
-    let mut cells = Vec::with_capacity(16 * patches.len());
-    let mut numbers = Vec::with_capacity(16 * patches.len());
-    for index in 0..patches.len() {
+pub fn nets(nets: &[Patch]) -> Vec<u8> {
+    let mut cells = Vec::with_capacity(16 * nets.len());
+    let mut numbers = Vec::with_capacity(16 * nets.len());
+    for index in 0..nets.len() {
         for i in 0..4 {
             for j in 0..4 {
                 let corners = [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)];
@@ -20,7 +28,7 @@ pub fn nets(patches: &[Patch]) -> Vec<u8> {
         }
     }
     vtu::write(
-        &points,
+        nets.as_flattened(),
         Cells {
             quads: &cells,
             ..Cells::default()
@@ -31,10 +39,13 @@ pub fn nets(patches: &[Patch]) -> Vec<u8> {
 }
 
 /// The patches as a VTU file of Bezier quadrilaterals of order 4, with the largest angle to a neighbour on each.
-pub fn bezier(patches: &[Patch], angles: &[f64]) -> Vec<u8> {
-    let points: Vec<[f64; 3]> = patches.iter().flat_map(surface::control_points).collect();
-    let numbers: Vec<f64> = (0..patches.len()).map(|index| index as f64).collect();
-    vtu::write_bezier_quadrilaterals(&points, 4, &[("patch", 1, &numbers), ("angle_to_neighbour", 1, angles)])
+pub fn bezier(nets: &[Patch], angles: &[f64]) -> Vec<u8> {
+    let numbers: Vec<f64> = (0..nets.len()).map(|index| index as f64).collect();
+    vtu::write_bezier_quadrilaterals(
+        nets.as_flattened(),
+        4,
+        &[("patch", 1, &numbers), ("angle_to_neighbour", 1, angles)],
+    )
 }
 
 /// The first line of the text.
@@ -42,17 +53,18 @@ const TITLE: &str = "biquartic patches";
 
 /// The control points as text that reads back to the same bits: after the title and the number of patches, 25 lines a patch,
 /// `5 i + j` for `B_i(u) B_j(v)` of degree 4.
-pub fn text(patches: &[Patch]) -> String {
-    let mut out = String::with_capacity(patches.len() * 1500 + 200);
+pub fn text(nets: &[Patch]) -> String {
+    let mut out = String::with_capacity(nets.len() * 1500 + 200);
     // Writing to a string cannot fail.
     let _ = writeln!(
         out,
-        "{TITLE} {}\n# 25 control points a patch: point 5 i + j belongs to B_i(u) B_j(v), Bernstein polynomials of degree 4",
-        patches.len()
+        "{TITLE} {}\n# 25 control points a patch: point 5 i + j belongs to B_i(u) B_j(v), Bernstein polynomials of degree 4\n\
+         # patch k is face k of the mesh; its points 0, 20, 24, 4 are the face's corners in their order",
+        nets.len()
     );
-    for (index, patch) in patches.iter().enumerate() {
+    for (index, net) in nets.iter().enumerate() {
         let _ = writeln!(out, "# patch {index}");
-        for [x, y, z] in surface::control_points(patch) {
+        for [x, y, z] in net {
             let _ = writeln!(out, "{x:?} {y:?} {z:?}");
         }
     }

@@ -7,10 +7,11 @@
 //! Edges are creases when the generator says so, the model's list names them, their quads carry different labels in the
 //! file or name different normals at their corners, or their planes meet at more than an angle.
 
+use super::orientation;
 use super::problem::Truth;
 use super::settings::Settings;
 use super::vertex_normals;
-use crate::linalg::vector3::{add, cross, dot, subtract, times};
+use crate::linalg::vector3::{add, dot, times};
 use crate::mesh::crease;
 use crate::mesh::format::Content;
 use crate::mesh::quadrilateral::{Connectivity, QuadrilateralMesh};
@@ -204,26 +205,8 @@ pub fn cut(
     })
 }
 
-/// Whether most normals point to the back of their quads; vertices may be left out.
-pub fn point_backward(mesh: &QuadrilateralMesh, normals: &[[f64; 3]], used: impl Fn(usize) -> bool) -> bool {
-    let (mut backward, mut all) = (0usize, 0usize);
-    for &quad in &mesh.quads {
-        let corners = mesh.corners(quad);
-        let face = cross(subtract(corners[2], corners[0]), subtract(corners[3], corners[1]));
-        for vertex in quad
-            .map(|vertex| vertex as usize)
-            .into_iter()
-            .filter(|&vertex| used(vertex))
-        {
-            all += 1;
-            backward += usize::from(dot(face, normals[vertex]) < 0.0);
-        }
-    }
-    2 * backward > all
-}
-
 /// Gives the vertices on creases a normal for each side: that of the side's formula where there is one, the mean of those that
-/// the side's corners name in the file, else one estimated from the side's quads.
+/// the side's corners name in the file, else one estimated from the side's quads; a notice says so where normals were `given`.
 ///
 /// # Errors
 /// When no normal can be estimated.
@@ -233,7 +216,9 @@ pub fn normals_by_side(
     connectivity: &Connectivity,
     truth: Option<&Truth>,
     corners: Option<&CornerNormals>,
+    given: bool,
     normals: &mut [[f64; 3]],
+    notices: &mut Vec<String>,
 ) -> Result<(), String> {
     let mut copies = vec![0u32; creases.whole.points.len()];
     for &vertex in &creases.original {
@@ -271,14 +256,18 @@ pub fn normals_by_side(
         return Ok(());
     }
     let estimated = vertex_normals::estimate(mesh, connectivity)?;
-    // Given normals may all point inward, which is mended later for all of them.
-    let sign = if point_backward(mesh, normals, |vertex| !on_crease(vertex)) {
-        -1.0
-    } else {
-        1.0
-    };
+    // The given normals of a part may all point inward, which is mended later for all of them.
+    let parts = orientation::parts(connectivity, Some(creases));
+    let backward = orientation::backward(&mesh.points, &mesh.quads, normals, &parts, |vertex| !on_crease(vertex));
     for vertex in (0..normals.len()).filter(|&vertex| on_crease(vertex)) {
-        normals[vertex] = times(estimated[vertex], sign);
+        normals[vertex] = times(estimated[vertex], if backward[vertex] { -1.0 } else { 1.0 });
+    }
+    let replaced = copies.iter().filter(|&&copies| copies > 1).count();
+    if given && replaced > 0 {
+        notices.push(format!(
+            "the normals given at {replaced} vertices on creases belong to no side: replaced there by those estimated from the \
+             quadrilaterals of each side"
+        ));
     }
     Ok(())
 }

@@ -13,6 +13,7 @@
 //! Source: Xue, Demkowicz, Bajaj 2004, equations 6 to 9, whose solution in the sense of least squares is in
 //! [`least_squares`](super::least_squares).
 
+use super::continuity::larger;
 use super::hermite;
 use super::network::Network;
 use crate::linalg::sparse::{BlockCholesky, BlockPattern};
@@ -56,12 +57,12 @@ pub fn residuals(network: &Network, slopes: &Slopes) -> Residuals {
             let x = f64::from(sample) / 8.0;
             let slope = hermite::combine(&hermite::slopes(x), &curve);
             let normal = hermite::combine(&hermite::values(x), &normals);
-            found.perpendicular = found.perpendicular.max(dot(slope, normal).abs() / length(slope));
+            found.perpendicular = larger(found.perpendicular, dot(slope, normal).abs() / length(slope));
         }
         found.largest = slopes[edge]
             .iter()
             .map(|&slope| length(slope))
-            .fold(found.largest, f64::max);
+            .fold(found.largest, larger);
     }
     let mut spokes = Vec::new();
     for vertex in 0..network.points.len() {
@@ -75,7 +76,7 @@ pub fn residuals(network: &Network, slopes: &Slopes) -> Residuals {
             };
             let (la, lb) = (length(a.tangent), length(b.tangent));
             let gap = dot(outward(a), b.tangent) - dot(outward(b), a.tangent);
-            found.twist = found.twist.max(gap.abs() * 0.5 * (la + lb) / (la * lb));
+            found.twist = larger(found.twist, gap.abs() * 0.5 * (la + lb) / (la * lb));
         }
     }
     found

@@ -11,6 +11,7 @@
 //! Guaranteed: tangents stay in the tangent planes; the residual never grows. Not guaranteed: that a solution exists near
 //! the start; the residual tells.
 
+use super::continuity::larger;
 use super::network::{Network, Spoke, in_plane};
 use crate::linalg::sparse::{BlockCholesky, BlockPattern};
 use crate::linalg::vector3::{add, cross, dot, subtract, times};
@@ -124,7 +125,7 @@ pub fn enclose(network: &mut Network, observer: &mut dyn Observer) -> Result<Enc
         .collect();
     let mut done = Enclosed::default();
     let mut values = violations(network);
-    let worst = |values: &[f64]| values.iter().fold(0.0f64, |worst, value| worst.max(value.abs()));
+    let worst = |values: &[f64]| values.iter().fold(0.0f64, |worst, value| larger(worst, value.abs()));
     let norm = |values: &[f64]| values.iter().map(|value| value * value).sum::<f64>().sqrt();
     done.before = worst(&values);
     done.residual = done.before;

@@ -8,7 +8,9 @@
 
 use super::edge_normals;
 use super::enclosure;
+use super::frame::Frame;
 use super::network::Network;
+use super::numbering::Numbering;
 use super::outcome::Metrics;
 use super::patch::{self, Operator, Patch, Reference, Solve};
 use super::problem::Problem;
@@ -17,9 +19,9 @@ use crate::fem::bernstein_hexahedron::{self as bernstein, ControlPoints, Verdict
 use crate::linalg::vector3::{add, dot, subtract, times};
 use crate::mesh::format::{Cells, vtu};
 use crate::mesh::length;
+use crate::mesh::quadrilateral::Connectivity;
 use crate::optimize::Observer;
 use rayon::prelude::*;
-use std::collections::BTreeMap;
 
 /// Where the hexahedra lie.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -61,6 +63,11 @@ impl Hexahedra {
         }
     }
 
+    /// Carries the hexahedra to the coordinates of the file.
+    pub fn leave(&mut self, frame: &Frame) {
+        frame.leave(self.cells.as_flattened_mut());
+    }
+
     /// The hexahedra as a VTU file of Bezier hexahedra of order 4.
     pub fn bezier(&self) -> Vec<u8> {
         let numbers: Vec<f64> = (0..self.cells.len()).map(|index| index as f64).collect();
@@ -74,6 +81,8 @@ impl Hexahedra {
 
 /// Parts into which the certificate may cut a hexahedron.
 const PARTS: usize = 512;
+/// Hexahedra judged between two questions whether to stop.
+const CHUNK: usize = 1024;
 
 /// Builds the hexahedra of a surface.
 ///
@@ -113,25 +122,29 @@ pub fn build(
             bernstein::transfinite(&faces(&at(layer), &at(layer + 1)))
         })
         .collect();
-    let judged: Vec<(Verdict, f64, f64)> = cells
-        .par_iter()
-        .map(|points| {
-            let mut least = f64::INFINITY;
-            let place = |index: usize| index as f64 / 5.0;
-            for i in 0..6 {
-                for j in 0..6 {
-                    for k in 0..6 {
-                        let (value, size) = bernstein::jacobian(points, [place(i), place(j), place(k)]);
-                        least = least.min(value / size.max(f64::MIN_POSITIVE));
-                    }
+    let judge = |points: &ControlPoints| {
+        let mut least = f64::INFINITY;
+        let place = |index: usize| index as f64 / 5.0;
+        for i in 0..6 {
+            for j in 0..6 {
+                for k in 0..6 {
+                    let (value, size) = bernstein::jacobian(points, [place(i), place(j), place(k)]);
+                    least = least.min(value / size.max(f64::MIN_POSITIVE));
                 }
             }
-            // The mean of Bernstein coefficients is the integral.
-            let values = bernstein::determinant(points);
-            let volume = values.iter().sum::<f64>() / values.len() as f64;
-            (bernstein::certify(points, PARTS), least, volume)
-        })
-        .collect();
+        }
+        // The mean of Bernstein coefficients is the integral.
+        let values = bernstein::determinant(points);
+        let volume = values.iter().sum::<f64>() / values.len() as f64;
+        (bernstein::certify(points, PARTS), least, volume)
+    };
+    let mut judged: Vec<(Verdict, f64, f64)> = Vec::with_capacity(cells.len());
+    for chunk in cells.chunks(CHUNK) {
+        if observer.stop().is_some() {
+            return Err("stopped from outside before all hexahedra were judged".to_string());
+        }
+        judged.par_extend(chunk.par_iter().map(judge));
+    }
     let mut found = Hexahedra {
         scaled: judged.iter().map(|(_, least, _)| *least).collect(),
         cells,
@@ -230,31 +243,40 @@ fn faces(low: &Patch, high: &Patch) -> [Patch; 6] {
     ]
 }
 
-/// A tessellation as a VTU file: every hexahedron in `pieces` along the surface and one across.
-pub fn tessellate(found: &Hexahedra, pieces: usize) -> Vec<u8> {
-    let width = pieces + 1;
-    let mut points = Vec::with_capacity(found.cells.len() * 2 * width * width);
+/// A tessellation as a VTU file: every hexahedron in `pieces` along the surface and one across. `quads` and `connectivity`
+/// are those of the surface before it was cut along creases: hexahedra share points there too, by number.
+///
+/// # Errors
+/// When there would be too many points.
+pub fn tessellate(
+    found: &Hexahedra,
+    quads: &[[u32; 4]],
+    connectivity: &Connectivity,
+    pieces: usize,
+) -> Result<Vec<u8>, String> {
+    let numbering = Numbering::new(quads, connectivity, pieces)?;
+    let level = numbering.len();
+    let layers = found.cells.len() / quads.len().max(1);
+    if level * (layers + 1) > u32::MAX as usize {
+        return Err(format!(
+            "{} hexahedra in {pieces} by {pieces} pieces have too many points; use fewer pieces (tessellation) or layers",
+            found.cells.len()
+        ));
+    }
+    let mut points = vec![[0.0; 3]; level * (layers + 1)];
     let mut cells = Vec::with_capacity(found.cells.len() * pieces * pieces);
     let mut fields: [Vec<f64>; 3] = Default::default();
-    // Points at the same place get one number, so that the faces between hexahedra are inner ones.
-    let mut names: BTreeMap<[u64; 3], u32> = BTreeMap::new();
     for (index, (cell, &scaled)) in found.cells.iter().zip(&found.scaled).enumerate() {
-        let mut local = Vec::with_capacity(2 * width * width);
+        let (layer, patch) = (index / quads.len(), index % quads.len());
+        let name = |i: usize, j: usize, k: usize| ((layer + k) * level + numbering.point(patch, i, j)) as u32;
         for k in 0..2 {
-            for j in 0..width {
-                for i in 0..width {
-                    let at = [i as f64 / pieces as f64, j as f64 / pieces as f64, f64::from(k)];
-                    let point = bernstein::position(cell, at);
-                    let key = point.map(|coordinate| (coordinate as f32).to_bits() as u64);
-                    let name = *names.entry(key).or_insert_with(|| {
-                        points.push(point);
-                        points.len() as u32 - 1
-                    });
-                    local.push(name);
+            for j in 0..=pieces {
+                for i in 0..=pieces {
+                    let at = [i as f64 / pieces as f64, j as f64 / pieces as f64, k as f64];
+                    points[name(i, j, k) as usize] = bernstein::position(cell, at);
                 }
             }
         }
-        let name = |i: usize, j: usize, k: usize| local[(k * width + j) * width + i];
         for j in 0..pieces {
             for i in 0..pieces {
                 let bottom = [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)];
@@ -271,7 +293,7 @@ pub fn tessellate(found: &Hexahedra, pieces: usize) -> Vec<u8> {
             }
         }
     }
-    vtu::write(
+    Ok(vtu::write(
         &points,
         Cells {
             hexahedra: &cells,
@@ -283,5 +305,5 @@ pub fn tessellate(found: &Hexahedra, pieces: usize) -> Vec<u8> {
             ("inverted", 1, &fields[1]),
             ("hexahedron", 1, &fields[2]),
         ],
-    )
+    ))
 }

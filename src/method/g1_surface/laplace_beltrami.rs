@@ -7,11 +7,13 @@
 //! surfaces the boundary values are given. Functions on the patches are tensor products of Lagrange polynomials at
 //! Gauss-Lobatto points; the geometry is that of the patches at every order, so that nothing but it limits the rates.
 
+use super::network::in_plane;
+use super::numbering::Numbering;
 use super::patch::Patch;
 use super::surface::{self, Place};
 use crate::linalg::elementary;
 use crate::linalg::sparse::{BlockCholesky, BlockPattern};
-use crate::linalg::vector3::dot;
+use crate::linalg::vector3::{add, dot, subtract, times};
 use crate::mesh::generate::surface::analytic::Analytic;
 use crate::mesh::quadrilateral::Connectivity;
 use rayon::prelude::*;
@@ -22,7 +24,7 @@ pub struct Solved {
     pub unknowns: usize,
     /// `L2` norm of the error over that of the solution, both on the patches.
     pub error: f64,
-    /// The same for the gradients along the patches, against the solution carried over by nearest points.
+    /// The same for the gradients along the patches, against that of the solution carried over by nearest points.
     pub gradient_error: f64,
 }
 
@@ -52,6 +54,28 @@ fn data(exact: &Analytic, x: [f64; 3]) -> (f64, [f64; 3], f64) {
     let laplacian = trace - across - exact.mean_curvature(x) * along;
     let tangential = std::array::from_fn(|axis| gradient[axis] - along * n[axis]);
     (value, tangential, value - laplacian)
+}
+
+/// The gradient in space, at `x`, of the function carried over from the surface by nearest points, from its gradient along the
+/// surface at the nearest point `foot`: the derivative of the nearest point is `(I + d W)^-1 P`, with the signed distance
+/// `d`, the projection `P` onto the tangent plane and the derivative `W` of the unit normal there (Dziuk and Elliott 2013,
+/// Finite element methods for surface PDEs, section 4.1).
+fn carried(exact: &Analytic, foot: [f64; 3], x: [f64; 3], gradient: [f64; 3]) -> [f64; 3] {
+    let level = exact.derivatives(foot);
+    let size = dot(level.gradient, level.gradient).sqrt();
+    let normal = times(level.gradient, 1.0 / size);
+    let distance = dot(subtract(x, foot), normal);
+    let columns: [[f64; 3]; 3] = std::array::from_fn(|axis| {
+        let mut unit = [0.0; 3];
+        unit[axis] = 1.0;
+        let along = in_plane(unit, normal);
+        let bent = [0, 1, 2].map(|row: usize| dot(level.hessian[row], along) / size);
+        add(unit, times(in_plane(bent, normal), distance))
+    });
+    let matrix = nalgebra::Matrix3::from_columns(&columns.map(nalgebra::Vector3::from));
+    // Singular only in the centres of curvature, where there is no nearest point.
+    let solved = matrix.lu().solve(&nalgebra::Vector3::from(gradient));
+    in_plane(solved.map_or(gradient, Into::into), normal)
 }
 
 /// Values of the Legendre polynomial of this degree and its derivative.
@@ -144,6 +168,7 @@ struct Sample {
     /// Area times weight.
     weight: f64,
     value: f64,
+    /// Along the patch, of the solution carried over by nearest points.
     gradient: [f64; 3],
     load: f64,
     /// Vectors in the tangent plane whose products with `X_u`, `X_v` are 1 or 0.
@@ -160,31 +185,16 @@ fn solve_order<const N: usize>(
     let nodes = lobatto(order);
     let inner = order - 1;
     let vertices = connectivity.stars.len();
-    let first_inner = vertices + connectivity.edges.len() * inner;
-    let total = first_inner + patches.len() * inner * inner;
+    let numbering = Numbering::new(quads, connectivity, order)?;
+    let total = numbering.len();
     let mut points = vec![[0.0; 3]; total];
     let mut free = vec![true; total];
     let places: Vec<Place> = nodes.iter().map(|&node| Place::new(node)).collect();
     let mut cells = Vec::with_capacity(patches.len());
-    for (index, (patch, quad)) in patches.iter().zip(quads).enumerate() {
-        let edges = connectivity.quad_edges[index];
-        let on_edge = |side: usize, step: usize| {
-            let along = quad[side] < quad[(side + 1) % 4];
-            vertices + edges[side] as usize * inner + if along { step } else { order - step } - 1
-        };
+    for (index, patch) in patches.iter().enumerate() {
         let cell: [u32; N] = std::array::from_fn(|local| {
             let (i, j) = (local % (order + 1), local / (order + 1));
-            let name = match (i, j) {
-                (0, 0) => quad[0] as usize,
-                (i, 0) if i == order => quad[1] as usize,
-                (0, j) if j == order => quad[3] as usize,
-                (i, j) if i == order && j == order => quad[2] as usize,
-                (i, 0) => on_edge(0, i),
-                (i, j) if i == order => on_edge(1, j),
-                (i, j) if j == order => on_edge(2, order - i),
-                (0, j) => on_edge(3, order - j),
-                (i, j) => first_inner + (index * inner + j - 1) * inner + i - 1,
-            };
+            let name = numbering.point(index, i, j);
             points[name] = surface::position(patch, &places[i], &places[j]);
             name as u32
         });
@@ -220,15 +230,18 @@ fn solve_order<const N: usize>(
                     let determinant = e * g - f * f;
                     let foot = exact.closest(jet.position);
                     let (value, gradient, load) = data(exact, foot);
+                    let gradient = carried(exact, foot, jet.position, gradient);
+                    let duals = [
+                        std::array::from_fn(|axis| (g * jet.u[axis] - f * jet.v[axis]) / determinant),
+                        std::array::from_fn(|axis| (e * jet.v[axis] - f * jet.u[axis]) / determinant),
+                    ];
+                    let (by_u, by_v) = (dot(gradient, jet.u), dot(gradient, jet.v));
                     samples.push(Sample {
                         weight: determinant.sqrt() * weight_u * weight_v,
                         value,
-                        gradient,
+                        gradient: add(times(duals[0], by_u), times(duals[1], by_v)),
                         load,
-                        duals: [
-                            std::array::from_fn(|axis| (g * jet.u[axis] - f * jet.v[axis]) / determinant),
-                            std::array::from_fn(|axis| (e * jet.v[axis] - f * jet.u[axis]) / determinant),
-                        ],
+                        duals,
                     });
                 }
             }

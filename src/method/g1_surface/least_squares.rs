@@ -19,11 +19,16 @@ use faer::Mat;
 /// Networks of at most this many curves are solved by a singular value decomposition.
 pub const DENSE: usize = 200;
 
+/// Steps on larger networks end at this change, relative to the solution.
+const SETTLED: f64 = 1e-12;
+
 /// A solution and what is known of the system.
 pub struct Solved {
     pub slopes: Slopes,
     /// Rank of the matrix at the tolerance; unknown for large networks.
     pub rank: Option<usize>,
+    /// Where the steps on a large network did not settle: the last change, relative to the solution.
+    pub unsettled: Option<f64>,
 }
 
 /// An equation: up to two curve ends (`2 edge + end`) with their coefficient vectors, and the right-hand side.
@@ -83,11 +88,12 @@ fn equations(network: &Network) -> Vec<Equation> {
 pub fn solve(network: &Network, tolerance: f64) -> Result<Solved, String> {
     let equations = equations(network);
     let unknowns = 6 * network.tangents.len();
-    let (solution, rank) = if network.tangents.len() <= DENSE {
+    let (solution, rank, unsettled) = if network.tangents.len() <= DENSE {
         let (solution, rank) = dense(&equations, unknowns, tolerance)?;
-        (solution, Some(rank))
+        (solution, Some(rank), None)
     } else {
-        (sparse(network, &equations, unknowns)?, None)
+        let (solution, change) = sparse(network, &equations, unknowns)?;
+        (solution, None, Some(change).filter(|change| !(*change <= SETTLED)))
     };
     let slopes = solution
         .as_chunks::<6>()
@@ -95,7 +101,11 @@ pub fn solve(network: &Network, tolerance: f64) -> Result<Solved, String> {
         .iter()
         .map(|&[a, b, c, d, e, f]| [[a, b, c], [d, e, f]])
         .collect();
-    Ok(Solved { slopes, rank })
+    Ok(Solved {
+        slopes,
+        rank,
+        unsettled,
+    })
 }
 
 /// The rank of the system at the tolerance, for networks of at most [`DENSE`] curves.
@@ -147,7 +157,7 @@ fn dense(equations: &[Equation], unknowns: usize, tolerance: f64) -> Result<(Vec
     Ok((solution, rank))
 }
 
-fn sparse(network: &Network, equations: &[Equation], unknowns: usize) -> Result<Vec<f64>, String> {
+fn sparse(network: &Network, equations: &[Equation], unknowns: usize) -> Result<(Vec<f64>, f64), String> {
     // A node for every curve end, near its vertex so that the order of elimination sees the surface.
     let points: Vec<[f64; 3]> = (0..2 * network.tangents.len())
         .map(|node| {
@@ -187,6 +197,7 @@ fn sparse(network: &Network, equations: &[Equation], unknowns: usize) -> Result<
     }
     let mut solution = vec![0.0; unknowns];
     let mut step = vec![0.0; unknowns];
+    let mut relative = f64::INFINITY;
     for _ in 0..30 {
         step.fill(0.0);
         for equation in equations {
@@ -207,9 +218,10 @@ fn sparse(network: &Network, equations: &[Equation], unknowns: usize) -> Result<
             change = change.max(step.abs());
             size = size.max(value.abs());
         }
-        if change <= 1e-12 * size {
+        relative = change / size.max(f64::MIN_POSITIVE);
+        if relative <= SETTLED {
             break;
         }
     }
-    Ok(solution)
+    Ok((solution, relative))
 }

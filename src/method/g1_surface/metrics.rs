@@ -21,7 +21,7 @@ pub const ALL: &[Metric] = &[
         "RMS angle",
         "deg",
         ZERO,
-        LOWER,
+        PLAIN,
         "Root of the mean square of the angles between the normals of the two patches over all these points.",
     ),
     metric(
@@ -29,7 +29,7 @@ pub const ALL: &[Metric] = &[
         "gap",
         "",
         ZERO,
-        LOWER,
+        PLAIN,
         "Largest distance between the two patches at one place of an edge, over the diagonal of the mesh's box.",
     ),
     metric(
@@ -37,12 +37,12 @@ pub const ALL: &[Metric] = &[
         "crease gap",
         "",
         ZERO,
-        LOWER,
+        PLAIN,
         "Largest distance between the two patches at one place of a crease, over the diagonal; undefined without creases.",
     ),
     metric(
-        "crease_angle",
-        "crease angle",
+        "crease_turn",
+        "crease turn",
         "deg",
         ZERO,
         PLAIN,
@@ -54,8 +54,8 @@ pub const ALL: &[Metric] = &[
         "",
         ZERO,
         LOWER,
-        "Largest distance of 9 by 9 points of every patch from the surface on which the vertices lie, in units of the file; \
-         undefined where that is unknown.",
+        "Largest distance of 9 by 9 points of every patch from the surface on which the vertices lie, in units of the file: the \
+         generator's formula, or else the model's `surface`, itself only triangles; undefined where there is neither.",
     ),
     metric(
         "distance_rms",
@@ -78,7 +78,7 @@ pub const ALL: &[Metric] = &[
         "curvature",
         "",
         ZERO,
-        LOWER,
+        PLAIN,
         "Integral of the sum of the squares of the principal curvatures over the surface, 5 by 5 Gauss points a patch.",
     ),
     metric(
@@ -110,7 +110,7 @@ pub const ALL: &[Metric] = &[
         "max t.n",
         "",
         ZERO,
-        LOWER,
+        PLAIN,
         "Largest |t.n| / |t| over the ends of all curves: how far the network is from tangent to the planes of the vertices.",
     ),
     metric(
@@ -264,7 +264,7 @@ pub const ALL: &[Metric] = &[
         "",
         ZERO,
         LOWER,
-        "The same for the gradients along the surface.",
+        "The same for the gradients along the patches, against that of the exact solution carried over by nearest points.",
     ),
     metric(
         "unknowns",

@@ -6,10 +6,12 @@
 //! [`construction`] runs them. Source: Xue, Demkowicz, Bajaj 2004, Reconstruction of G1 surfaces with biquartic patches for hp
 //! finite element simulations.
 //!
-//! Guaranteed with the default settings, where the enclosure condition could be met (a metric tells): normals of
-//! neighbouring patches agree along their whole edge to rounding, at vertices of every valence, except along creases; patches
-//! share their curves exactly, creases too; the same input gives the same bits with any number of threads. Not guaranteed:
-//! that the surface is free of folds (a metric counts them) or does not meet itself.
+//! Guaranteed with the default settings, where a run ends `converged`: no patch folds at 9 by 9 points, and normals of
+//! neighbouring patches agree along their whole edge to rounding, at vertices of every valence, except along creases. A run in
+//! which a patch folds ends `folded` and names it; one whose normals disagree ends `stalled`. Always: patches share their
+//! curves exactly, creases too; the same input gives the same bits with any number of threads; where the surface lies and how
+//! large it is does not matter (see [`frame`]). Not guaranteed: that conditions can be met for all data, that the surface is
+//! free of folds between the points, or does not meet itself.
 
 pub mod balance;
 pub mod construction;
@@ -19,6 +21,7 @@ pub mod creases;
 pub mod edge_normals;
 pub mod enclosure;
 pub mod evaluation;
+pub mod frame;
 pub mod hermite;
 pub mod hexahedra;
 pub mod laplace_beltrami;
@@ -26,6 +29,8 @@ pub mod least_squares;
 pub mod metrics;
 pub mod model;
 pub mod network;
+pub mod numbering;
+pub mod orientation;
 pub mod outcome;
 pub mod patch;
 pub mod problem;
@@ -55,7 +60,7 @@ impl Method for G1Surface {
     }
 
     fn version(&self) -> u32 {
-        2
+        3
     }
 
     fn summary(&self) -> &'static str {
@@ -97,7 +102,7 @@ impl Method for G1Surface {
     fn run(&self, inputs: Inputs<'_>, observer: &mut dyn Observer) -> Result<Outcome, Failure> {
         let settings = Settings::resolve(inputs.settings)?;
         observer.phase("prepare");
-        let problem = Problem::new(&inputs.model, &settings)?;
+        let problem = Problem::new(&inputs.model, &settings, observer)?;
         run(&problem, &settings, observer)
     }
 }
@@ -119,7 +124,8 @@ pub const COUNTERS: &[(&str, &str)] = &[
 pub fn run(problem: &Problem, settings: &Settings, observer: &mut dyn Observer) -> Result<Outcome, Failure> {
     let mut built = build(problem, settings, observer)?;
     observer.phase("measure");
-    let continuity = outcome::measure(problem, &built.network.normals, &built.patches, &mut built.metrics);
+    let shape = outcome::measure(problem, &built.network.normals, &built.patches, &mut built.metrics);
+    built.judge(problem, settings, &shape);
     built
         .metrics
         .insert("edge_length".to_string(), outcome::mean_edge(problem));
@@ -135,9 +141,15 @@ pub fn run(problem: &Problem, settings: &Settings, observer: &mut dyn Observer) 
         found.tell(&mut built.metrics);
         shell = Some(found);
     }
-    let angles = outcome::angles_to_neighbours(&problem.connectivity, &continuity);
+    // From here on everything is in the coordinates of the file.
+    let frame = &problem.frame;
+    frame.leave_metrics(&mut built.metrics);
+    if let Some(shell) = &mut shell {
+        shell.leave(frame);
+    }
+    let angles = outcome::angles_to_neighbours(&problem.connectivity, &shape.continuity);
     let tessellate = || {
-        outcome::tessellate(
+        let mut found = outcome::tessellate(
             &built.patches,
             &problem.connectivity,
             &problem.mesh.quads,
@@ -145,15 +157,23 @@ pub fn run(problem: &Problem, settings: &Settings, observer: &mut dyn Observer) 
             outcome::pieces(settings, built.patches.len()),
             settings.stripes,
         )
+        .map_err(problem::invalid)?;
+        found.leave(frame);
+        Ok::<_, Failure>(found)
     };
+    let nets = || control_net::of(&built.patches, frame);
     let mesh = match &shell {
-        _ if settings.result == "control-points" => control_net::nets(&built.patches),
-        Some(shell) => hexahedra::tessellate(shell, outcome::pieces(settings, shell.cells.len()).min(6)),
-        None => tessellate().vtu(),
+        _ if settings.result == "control-points" => control_net::nets(&nets()),
+        Some(shell) => {
+            let pieces = outcome::pieces(settings, shell.cells.len()).min(6);
+            let (mesh, connectivity) = problem.whole();
+            hexahedra::tessellate(shell, &mesh.quads, connectivity, pieces).map_err(problem::invalid)?
+        }
+        None => tessellate()?.vtu(),
     };
     let mut files = BTreeMap::new();
     if settings.exports("bezier") {
-        files.insert("bezier.vtu".to_string(), control_net::bezier(&built.patches, &angles));
+        files.insert("bezier.vtu".to_string(), control_net::bezier(&nets(), &angles));
         if let Some(shell) = &shell {
             files.insert("bezier-hexahedra.vtu".to_string(), shell.bezier());
         }
@@ -161,11 +181,11 @@ pub fn run(problem: &Problem, settings: &Settings, observer: &mut dyn Observer) 
     if settings.exports("obj") {
         files.insert(
             "tessellation.obj".to_string(),
-            tessellate().obj().map_err(problem::invalid)?,
+            tessellate()?.obj().map_err(problem::invalid)?,
         );
     }
     if settings.exports("control-points") {
-        let text = control_net::text(&built.patches);
+        let text = control_net::text(&nets());
         files.insert("control-points.txt".to_string(), text.into_bytes());
     }
     Ok(Outcome {

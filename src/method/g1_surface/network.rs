@@ -7,8 +7,9 @@
 //! Guaranteed: every curve is perpendicular to the normals at its ends, whatever is done to the tangents by the functions of
 //! this folder. Not guaranteed: that curves do not meet outside their ends.
 
-use super::creases::{self, Creases};
+use super::creases::Creases;
 use super::hermite;
+use super::orientation;
 use crate::linalg::vector3::{add, cross, dot, subtract, times};
 use crate::mesh::length;
 use crate::mesh::quadrilateral::{Connectivity, QuadrilateralMesh};
@@ -160,7 +161,7 @@ impl Network {
             on_crease: vec![false; connectivity.edges.len()],
             connectivity,
         };
-        network.orient_normals(&mut notices);
+        network.orient_normals(creases, &mut notices);
         if let Some(creases) = creases {
             network.join_planes(creases, &mut notices);
         }
@@ -183,23 +184,31 @@ impl Network {
         Ok((network, notices))
     }
 
-    /// Turns all normals round where most of them point to the back of their quads.
-    fn orient_normals(&mut self, notices: &mut Vec<String>) {
-        let mesh = QuadrilateralMesh {
-            points: std::mem::take(&mut self.points),
-            quads: std::mem::take(&mut self.quads),
-            normals: None,
-        };
-        let backward = creases::point_backward(&mesh, &self.normals, |_| true);
-        (self.points, self.quads) = (mesh.points, mesh.quads);
-        if backward {
-            for normal in &mut self.normals {
-                *normal = normal.map(|component| -component);
-            }
-            notices.push(
-                "the normals point to the side from which the quadrilaterals are seen clockwise; turned round"
-                    .to_string(),
-            );
+    /// Turns the normals of every part of the surface round where most of them point to the back of their quads.
+    fn orient_normals(&mut self, creases: Option<&Creases>, notices: &mut Vec<String>) {
+        let parts = orientation::parts(&self.connectivity, creases);
+        let backward = orientation::backward(&self.points, &self.quads, &self.normals, &parts, |_| true);
+        let turned = backward.iter().filter(|&&backward| backward).count();
+        for (normal, _) in self
+            .normals
+            .iter_mut()
+            .zip(&backward)
+            .filter(|(_, backward)| **backward)
+        {
+            *normal = normal.map(|component| -component);
+        }
+        if turned > 0 {
+            let which = if turned == backward.len() {
+                "the normals".to_string()
+            } else {
+                format!(
+                    "the normals at {turned} of {} vertices, whole parts of the surface,",
+                    backward.len()
+                )
+            };
+            notices.push(format!(
+                "{which} point to the side from which the quadrilaterals are seen clockwise; turned round"
+            ));
         }
     }
 
@@ -321,12 +330,21 @@ impl Network {
                 let sine =
                     dot(self.normals[vertex], cross(a.tangent, b.tangent)) / (length(a.tangent) * length(b.tangent));
                 if sine.abs() < FLAT {
+                    let turning = [a.edge, b.edge].map(|edge| self.on_crease[edge as usize]) == [true, true];
                     let [a, b] = [a.edge, b.edge].map(|edge| named(self.connectivity.other_end(edge, vertex as u32)));
                     let here = named(vertex as u32);
-                    return Err(format!(
-                        "at vertex {here} the edges to vertices {a} and {b} (counted from 0) leave in one line as seen \
-                         along the normal, or the normal is tangent to their plane; move the vertex or correct its normal"
-                    ));
+                    return Err(if turning {
+                        format!(
+                            "at vertex {here} the creases to vertices {a} and {b} (counted from 0), sides of one quadrilateral, \
+                             leave in one line: a crease may not turn within one quadrilateral; add a third crease at this \
+                             vertex, or take one of the two out"
+                        )
+                    } else {
+                        format!(
+                            "at vertex {here} the edges to vertices {a} and {b} (counted from 0) leave in one line as seen \
+                             along the normal, or the normal is tangent to their plane; move the vertex or correct its normal"
+                        )
+                    });
                 }
                 if sine < 0.0 && folds.last() != Some(&(vertex as u32)) {
                     folds.push(vertex as u32);

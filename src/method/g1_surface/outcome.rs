@@ -1,7 +1,9 @@
 //! What is reported of a surface: its metrics and a tessellation with fields to colour it by.
 
-use super::continuity::{self, Continuity};
+use super::continuity::{self, Continuity, larger};
 use super::evaluation::{Derivatives, Evaluated, Places, evaluate};
+use super::frame::Frame;
+use super::numbering::Numbering;
 use super::patch::{GAUSS_5, Patch};
 use super::problem::{Problem, Truth};
 use super::settings::Settings;
@@ -67,8 +69,16 @@ struct Measured {
     distance_squares: f64,
 }
 
+/// What [`measure`] found beside the metrics.
+pub struct Shape {
+    pub continuity: Continuity,
+    /// Number of patches that fold, and the first of them.
+    pub folded: usize,
+    pub first_folded: Option<usize>,
+}
+
 /// Measures patches over a problem's mesh: continuity, distance, folds, area, curvature.
-pub fn measure(problem: &Problem, normals: &[[f64; 3]], patches: &[Patch], metrics: &mut Metrics) -> Continuity {
+pub fn measure(problem: &Problem, normals: &[[f64; 3]], patches: &[Patch], metrics: &mut Metrics) -> Shape {
     let folding = Folding::default();
     let line = GAUSS_5.map(|(x, _)| x);
     let gauss = Places::grid(&line, &line);
@@ -92,7 +102,7 @@ pub fn measure(problem: &Problem, normals: &[[f64; 3]], patches: &[Patch], metri
                 for point in 0..evaluated.len() {
                     let [position, _, _] = evaluated.first(point);
                     let distance = truth.distance(index, position);
-                    found.distance_max = found.distance_max.max(distance);
+                    found.distance_max = larger(found.distance_max, distance);
                     found.distance_squares += distance * distance;
                 }
             }
@@ -100,18 +110,19 @@ pub fn measure(problem: &Problem, normals: &[[f64; 3]], patches: &[Patch], metri
         })
         .collect();
     let continuity = continuity::measure(patches, &problem.connectivity);
+    let folded = measured.iter().filter(|patch| patch.folded).count();
     let mut set = |name: &str, value: f64| {
         metrics.insert(name.to_string(), value);
     };
     let sum = |value: fn(&Measured) -> f64| measured.iter().map(value).sum::<f64>();
     set("area", sum(|patch| patch.area));
     set("curvature_energy", sum(|patch| patch.curvature));
-    set("folded", sum(|patch| f64::from(u8::from(patch.folded))));
+    set("folded", folded as f64);
     if problem.truth.is_some() {
         let count = (patches.len() * SAMPLES * SAMPLES) as f64;
         set(
             "distance_max",
-            measured.iter().map(|patch| patch.distance_max).fold(0.0, f64::max),
+            measured.iter().map(|patch| patch.distance_max).fold(0.0, larger),
         );
         set("distance_rms", (sum(|patch| patch.distance_squares) / count).sqrt());
     }
@@ -122,9 +133,13 @@ pub fn measure(problem: &Problem, normals: &[[f64; 3]], patches: &[Patch], metri
     if let Some(creases) = &problem.creases {
         let [gap, angle] = continuity::measure_creases(patches, &problem.connectivity, &creases.pairs);
         set("crease_gap", gap / size);
-        set("crease_angle", angle);
+        set("crease_turn", angle);
     }
-    continuity
+    Shape {
+        continuity,
+        folded,
+        first_folded: measured.iter().position(|patch| patch.folded),
+    }
 }
 
 impl Truth {
@@ -195,6 +210,9 @@ fn stripes_of(normal: [f64; 3], stripes: f64) -> [f64; 2] {
 }
 
 /// Tessellates every patch in `pieces` by `pieces` quads that share points with their neighbours.
+///
+/// # Errors
+/// When there would be too many points.
 pub fn tessellate(
     patches: &[Patch],
     connectivity: &Connectivity,
@@ -202,11 +220,9 @@ pub fn tessellate(
     angles: &[f64],
     pieces: usize,
     stripes: f64,
-) -> Tessellation {
-    let inner = pieces - 1;
-    let vertices = connectivity.stars.len();
-    let first_inner = vertices + connectivity.edges.len() * inner;
-    let mut points = vec![[0.0; 3]; first_inner + patches.len() * inner * inner];
+) -> Result<Tessellation, String> {
+    let numbering = Numbering::new(quads, connectivity, pieces)?;
+    let mut points = vec![[0.0; 3]; numbering.len()];
     let mut normals = points.clone();
     let mut cells = Vec::with_capacity(patches.len() * pieces * pieces);
     let mut fields: [Vec<f64>; FIELDS.len()] = Default::default();
@@ -217,27 +233,8 @@ pub fn tessellate(
     let (corners, centres) = (Places::grid(&corners, &corners), Places::grid(&centres, &centres));
     let processor = Processor::detect();
     let mut evaluated = Evaluated::default();
-    for (index, (patch, quad)) in patches.iter().zip(quads).enumerate() {
-        let edges = connectivity.quad_edges[index];
-        // The number of the point (i, j) of this patch.
-        let name = |i: usize, j: usize| -> usize {
-            let on_edge = |side: usize, step: usize| {
-                let along = quad[side] < quad[(side + 1) % 4];
-                let step = if along { step } else { pieces - step };
-                vertices + edges[side] as usize * inner + step - 1
-            };
-            match (i, j) {
-                (0, 0) => quad[0] as usize,
-                (i, 0) if i == pieces => quad[1] as usize,
-                (0, j) if j == pieces => quad[3] as usize,
-                (i, j) if i == pieces && j == pieces => quad[2] as usize,
-                (i, 0) => on_edge(0, i),
-                (i, j) if i == pieces => on_edge(1, j),
-                (i, j) if j == pieces => on_edge(2, pieces - i),
-                (0, j) => on_edge(3, pieces - j),
-                (i, j) => first_inner + (index * inner + j - 1) * inner + i - 1,
-            }
-        };
+    for (index, patch) in patches.iter().enumerate() {
+        let name = |i: usize, j: usize| numbering.point(index, i, j);
         evaluate(processor, patch, &corners, Derivatives::First, &mut evaluated);
         for j in 0..=pieces {
             for i in 0..=pieces {
@@ -266,15 +263,27 @@ pub fn tessellate(
     for normal in &mut normals {
         *normal = times(*normal, 1.0 / length(*normal).max(f64::MIN_POSITIVE));
     }
-    Tessellation {
+    Ok(Tessellation {
         points,
         normals,
         quads: cells,
         fields,
-    }
+    })
 }
 
 impl Tessellation {
+    /// Carries everything to the coordinates of the file.
+    pub fn leave(&mut self, frame: &Frame) {
+        frame.leave(&mut self.points);
+        for (name, values) in FIELDS.iter().zip(&mut self.fields) {
+            match *name {
+                "mean_curvature" => frame.leave_curvatures(values, 1),
+                "gauss_curvature" => frame.leave_curvatures(values, 2),
+                _ => {}
+            }
+        }
+    }
+
     /// As a VTU file with all fields.
     pub fn vtu(&self) -> Vec<u8> {
         let fields: Vec<vtu::FieldView<'_>> = FIELDS
@@ -316,7 +325,7 @@ impl Tessellation {
 pub fn angles_to_neighbours(connectivity: &Connectivity, continuity: &Continuity) -> Vec<f64> {
     let largest = |edges: &[u32; 4]| {
         let angles = edges.iter().map(|&edge| continuity.of_edge[edge as usize]);
-        angles.fold(0.0, f64::max)
+        angles.fold(0.0, larger)
     };
     connectivity.quad_edges.iter().map(largest).collect()
 }

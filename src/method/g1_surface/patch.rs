@@ -13,6 +13,7 @@
 //! Guaranteed: patches share the network's curves to the last bit of their coefficients. With slopes that meet the twist
 //! condition the sides have the network's normal to rounding. Not guaranteed: that a patch does not fold between its sides.
 
+use super::continuity::larger;
 use super::edge_normals::{self, Slopes};
 use super::hermite;
 use super::network::{Network, in_plane};
@@ -271,7 +272,7 @@ fn residual(patch: &Patch, normals: &[[[f64; 3]; 4]; 4]) -> f64 {
         for sample in 1..7 {
             let x = f64::from(sample) / 7.0;
             let normal = hermite::combine(&hermite::values(x), normals);
-            worst = worst.max(dot(across(patch, side, x), normal).abs());
+            worst = larger(worst, dot(across(patch, side, x), normal).abs());
         }
     }
     worst

@@ -2,17 +2,21 @@
 //! which the vertices lie, where it is known.
 
 use super::creases::{self, CornerNormals, Creases, Sources};
+use super::frame::Frame;
 use super::model::{DUAL_CONTOURING, RAYS};
 use super::sampled::Sampled;
 use super::settings::{Settings, VertexNormals};
 use super::vertex_normals;
-use crate::mesh::TriangleMesh;
+use crate::linalg::vector3::dot;
 use crate::mesh::check::{self, Severity};
+use crate::mesh::crease;
 use crate::mesh::format;
 use crate::mesh::generate::surface::{self, Creased, analytic::Analytic};
 use crate::mesh::quadrilateral::{self, Connectivity, QuadrilateralMesh, Triangles};
+use crate::mesh::{TriangleMesh, length};
 use crate::method::Failure;
 use crate::method::model::{LoadedModel, Part};
+use crate::optimize::Observer;
 use serde_json::Value;
 
 /// The surface on which the vertices lie.
@@ -34,8 +38,13 @@ pub struct Problem {
     pub truth: Option<Truth>,
     /// Where the mesh was cut open along creases.
     pub creases: Option<Creases>,
+    /// The coordinates that mesh and sampled surface are in.
+    pub frame: Frame,
     pub notices: Vec<String>,
 }
+
+/// Degrees between planes from which on an edge that stays smooth is worth a notice.
+const SHARP: f64 = 60.0;
 
 pub(super) fn invalid(reason: String) -> Failure {
     Failure {
@@ -49,6 +58,8 @@ struct Given {
     mesh: QuadrilateralMesh,
     truth: Option<Truth>,
     sources: Sources,
+    /// Whether the mesh was made on the sampled surface, in its frame.
+    on_sampled: bool,
 }
 
 impl Problem {
@@ -56,17 +67,33 @@ impl Problem {
     ///
     /// # Errors
     /// `invalid-input` for a mesh or normals that cannot be used.
-    pub fn new(model: &LoadedModel, settings: &Settings) -> Result<Problem, Failure> {
+    pub fn new(model: &LoadedModel, settings: &Settings, observer: &dyn Observer) -> Result<Problem, Failure> {
         let mut notices = Vec::new();
+        let mut frame = Frame::default();
         let sampled = match model.parts.get("surface") {
-            Some(part) => Some(Sampled::new(read_surface(part, &mut notices)?)),
+            Some(part) => {
+                let mut surface = read_surface(part, &mut notices)?;
+                frame = Frame::of(&surface.points);
+                frame.enter(&mut surface.points);
+                Some(Sampled::new(surface))
+            }
             None => None,
         };
         let Given {
             mut mesh,
             truth,
             mut sources,
-        } = given(model, settings, sampled.as_ref(), &mut notices)?;
+            on_sampled,
+        } = given(model, settings, sampled.as_ref(), observer, &mut notices)?;
+        if truth.is_some() {
+            // A formula stands in its own coordinates, near the origin.
+            frame = Frame::default();
+        } else if !on_sampled {
+            if sampled.is_none() {
+                frame = Frame::of(&mesh.points);
+            }
+            frame.enter(&mut mesh.points);
+        }
         if let Some(part) = model.parts.get("creases") {
             sources.listed.extend(read_creases(part, &mesh, &sources)?);
         }
@@ -82,18 +109,40 @@ impl Problem {
             ))
         })?;
         let truth = truth.or(sampled.map(Truth::Sampled));
+        let given =
+            mesh.normals.is_some() && matches!(settings.vertex_normals, VertexNormals::Auto | VertexNormals::Given);
         let mut creases = None;
         if settings.keeps_creases() {
             let sharp = creases::sharp(&mesh, &connectivity, &sources, settings).map_err(invalid)?;
             if sharp.contains(&true) {
                 creases = creases::cut(&mut mesh, &mut connectivity, sharp, &mut notices);
+            } else if truth.is_none() && settings.crease_angle.is_none() {
+                let count = crease::by_angle(&mesh, &connectivity, SHARP)
+                    .into_iter()
+                    .filter(|&sharp| sharp)
+                    .count();
+                if count > 0 {
+                    notices.push(format!(
+                        "{count} edges are sharper than {SHARP} degrees and are rounded off; crease_angle = {SHARP} keeps them \
+                         sharp"
+                    ));
+                }
             }
         }
         let mut normals = normals(&mut mesh, &connectivity, truth.as_ref(), settings, &mut notices)?;
         if let Some(creases) = &creases {
             let corners = sources.corners.as_ref();
-            creases::normals_by_side(creases, &mesh, &connectivity, truth.as_ref(), corners, &mut normals)
-                .map_err(|reason| invalid(format!("mesh: {reason}")))?;
+            creases::normals_by_side(
+                creases,
+                &mesh,
+                &connectivity,
+                truth.as_ref(),
+                corners,
+                given,
+                &mut normals,
+                &mut notices,
+            )
+            .map_err(|reason| invalid(format!("mesh: {reason}")))?;
         }
         Ok(Problem {
             mesh,
@@ -101,6 +150,7 @@ impl Problem {
             normals,
             truth,
             creases,
+            frame,
             notices,
         })
     }
@@ -119,6 +169,7 @@ fn given(
     model: &LoadedModel,
     settings: &Settings,
     sampled: Option<&Sampled>,
+    observer: &dyn Observer,
     notices: &mut Vec<String>,
 ) -> Result<Given, Failure> {
     let part = model
@@ -146,14 +197,15 @@ fn given(
             let number = |name: &str| parameters.get(name).and_then(Value::as_u64).unwrap_or(0) as usize;
             let (cells, smoothing) = (number("cells"), number("smoothing"));
             let mesh = if generator == RAYS {
-                sampled.by_rays(cells, smoothing)
+                sampled.by_rays(cells, smoothing, observer)
             } else {
-                sampled.by_dual_contouring(cells, smoothing)
+                sampled.by_dual_contouring(cells, smoothing, observer)
             };
             Ok(Given {
                 mesh: mesh.map_err(|reason| invalid(format!("generator \"{generator}\" of the mesh: {reason}")))?,
                 truth: None,
                 sources: Sources::default(),
+                on_sampled: true,
             })
         }
         Part::Generated { generator, parameters } => {
@@ -168,6 +220,7 @@ fn given(
                     listed: listed.unwrap_or_default(),
                     ..Sources::default()
                 },
+                on_sampled: false,
             })
         }
         Part::File {
@@ -234,6 +287,20 @@ fn read_quads(
     let content = format::read(name, bytes).map_err(|error| invalid(error.to_string()))?;
     notices.extend(content.notices.iter().map(|notice| format!("{name}: {notice}")));
     let split = parameters.get("triangles").and_then(Value::as_str) == Some("split");
+    if !split && !content.triangles.is_empty() {
+        let (triangles, quads) = (content.triangles.len(), content.quads.len());
+        let what = if quads == 0 {
+            format!("this is a triangle mesh, of {triangles} triangles")
+        } else {
+            format!("there are {triangles} triangles among {quads} quadrilaterals")
+        };
+        return Err(invalid(format!(
+            "{name}: {what}, the first with vertices {:?} (counted from 0); remesh it with quadrilaterals, or write mesh = {{ \
+             file = \"{name}\", triangles = \"split\" }} to cut every triangle into three quadrilaterals and every \
+             quadrilateral into four",
+            content.triangles[0]
+        )));
+    }
     let triangles = if split { Triangles::Split } else { Triangles::Refuse };
     let (mut mesh, found) =
         QuadrilateralMesh::from_content(&content, triangles).map_err(|reason| invalid(format!("{name}: {reason}")))?;
@@ -261,6 +328,7 @@ fn read_quads(
             normals,
         })
     } else {
+        notices.extend(summed_normals(name, bytes, &mesh));
         None
     };
     Ok(Given {
@@ -273,7 +341,29 @@ fn read_quads(
             halved: !content.triangles.is_empty(),
             vertices: Some(content.points.len()),
         },
+        on_sampled: false,
     })
+}
+
+/// A notice where the corners of an OBJ file's quads name different normals at a vertex, of which the sum is used.
+fn summed_normals(name: &str, bytes: &[u8], mesh: &QuadrilateralMesh) -> Option<String> {
+    if !name.to_ascii_lowercase().ends_with(".obj") {
+        return None;
+    }
+    let corners = format::quad_corner_normals(bytes).filter(|corners| corners.len() == mesh.quads.len())?;
+    let mut first: Vec<Option<[f64; 3]>> = vec![None; mesh.points.len()];
+    let mut differs = vec![false; mesh.points.len()];
+    for (vertex, normal) in mesh.quads.as_flattened().iter().zip(corners.as_flattened()) {
+        let known = *first[*vertex as usize].get_or_insert(*normal);
+        let (sizes, cosine) = (length(known) * length(*normal), dot(known, *normal));
+        differs[*vertex as usize] |= cosine < (1.0 - 1e-6) * sizes;
+    }
+    let place = differs.iter().position(|&differs| differs)?;
+    let count = differs.iter().filter(|&&differs| differs).count();
+    Some(format!(
+        "{name}: at {count} vertices, the first is vertex {place} (from 0), the corners of faces name different normals: their sum \
+         is used; crease_normals = true keeps such edges sharp"
+    ))
 }
 
 /// A triangulated surface, from a file or generated; quads are cut in two.

@@ -61,7 +61,7 @@ pub fn repair(
         let found = match balance::balance(&mut changed, stiffness, start, observer) {
             Ok(found) => found,
             Err(error) => {
-                done.notice = Some(format!("a repair of folded patches failed: {error}"));
+                done.notice = Some(format!("repair {} failed: {error}", done.tries));
                 continue;
             }
         };
@@ -75,6 +75,14 @@ pub fn repair(
             done.change = done.change.max(found.largest_change);
             done.kept = true;
         }
+    }
+    if let Some(first) = folded.iter().position(|&folded| folded) {
+        let count = folded.iter().filter(|&&folded| folded).count();
+        let failure = done.notice.map_or(String::new(), |failure| format!("; {failure}"));
+        done.notice = Some(format!(
+            "{count} patches still fold after {} repairs, the first is patch {first} (from 0){failure}",
+            done.tries
+        ));
     }
     done
 }

@@ -8,8 +8,12 @@ use crate::linalg::vector3::{add, cross, dot, subtract, times};
 use crate::mesh::generate::surface::cubed_sphere;
 use crate::mesh::quadrilateral::{Connectivity, QuadrilateralMesh};
 use crate::mesh::{TriangleMesh, area_vector, length};
+use crate::optimize::Observer;
 use rayon::prelude::*;
 use std::sync::Arc;
+
+/// More cubes than these are not contoured: they would take gigabytes.
+const MOST_CUBES: f64 = 4e7;
 
 /// See the module.
 #[derive(Clone)]
@@ -70,7 +74,12 @@ impl Sampled {
     ///
     /// # Errors
     /// Where a ray hits nothing.
-    pub fn by_rays(&self, cells: usize, smoothing: usize) -> Result<QuadrilateralMesh, String> {
+    pub fn by_rays(
+        &self,
+        cells: usize,
+        smoothing: usize,
+        observer: &dyn Observer,
+    ) -> Result<QuadrilateralMesh, String> {
         let (directions, quads) = cubed_sphere::directions(cells);
         let Some([low, high]) = crate::mesh::bounding_box(&self.surface.points) else {
             return Err("the surface has no points".to_string());
@@ -82,13 +91,13 @@ impl Sampled {
             let hits = rays.hits(centre, direction);
             let Some(hit) = hits.last() else {
                 return Err(format!(
-                    "the ray from the centre {centre:?} of the box in direction {direction:?} meets no triangle; the surface \
+                    "the ray from the centre of the box in direction {direction:?} meets no triangle; the surface \
                      must be closed around its centre"
                 ));
             };
             points.push(add(centre, times(direction, hit.distance)));
         }
-        self.smoothed(points, quads, smoothing)
+        self.smoothed(points, quads, smoothing, observer)
     }
 
     /// Quads around the surface by dual contouring of its signed distance, `cells` cubes along the longest side of its box,
@@ -96,10 +105,30 @@ impl Sampled {
     ///
     /// # Errors
     /// Where the surface is open, or too thin for the cubes.
-    pub fn by_dual_contouring(&self, cells: usize, smoothing: usize) -> Result<QuadrilateralMesh, String> {
+    pub fn by_dual_contouring(
+        &self,
+        cells: usize,
+        smoothing: usize,
+        observer: &dyn Observer,
+    ) -> Result<QuadrilateralMesh, String> {
+        let Some([low, high]) = crate::mesh::bounding_box(&self.surface.points) else {
+            return Err("the surface has no points".to_string());
+        };
+        let extent = subtract(high, low);
+        let longest = extent.into_iter().fold(0.0, f64::max);
+        let cubes: f64 = extent
+            .iter()
+            .map(|side| (cells as f64 * side / longest).ceil().max(1.0))
+            .product();
+        if !(cubes <= MOST_CUBES) {
+            return Err(format!(
+                "cells = {cells} asks for {cubes:.0} cubes in the box of the surface, more than the {MOST_CUBES:.0} that are \
+                 made; use fewer cells"
+            ));
+        }
         let project = |point| self.project(point);
         let (points, quads) = dual_contour(&self.surface, &self.nearest, &project, cells)?;
-        self.smoothed(points, quads, smoothing)
+        self.smoothed(points, quads, smoothing, observer)
     }
 
     /// Every vertex moves halfway to the mean of its neighbours and back onto the surface, `rounds` times, in the end onto
@@ -109,10 +138,14 @@ impl Sampled {
         mut points: Vec<[f64; 3]>,
         quads: Vec<[u32; 4]>,
         rounds: usize,
+        observer: &dyn Observer,
     ) -> Result<QuadrilateralMesh, String> {
         let connectivity = Connectivity::of(&quads, points.len())
             .map_err(|defects| format!("the quadrilaterals form no surface: {defects:?}; use more or fewer cells"))?;
         for _ in 0..rounds {
+            if observer.stop().is_some() {
+                return Err("stopped from outside while the quadrilaterals were smoothed".to_string());
+            }
             let before = points.clone();
             points.par_iter_mut().enumerate().for_each(|(vertex, point)| {
                 let mut sum = [0.0; 3];

@@ -7,6 +7,9 @@ use crate::method::setting::{Default, Field, Kind, fill};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
+/// The default of `rank_tolerance`.
+pub const RANK_TOLERANCE: f64 = 1e-10;
+
 /// Everything that `[settings]` may hold.
 pub static FIELDS: &[Field] = &[
     Field {
@@ -138,8 +141,9 @@ pub static FIELDS: &[Field] = &[
     Field {
         name: "rank_tolerance",
         kind: Kind::Number { min: 0.0, max: 0.1 },
-        default: Default::Number(1e-10),
-        doc: "Share of the largest singular value below which one counts as zero in the least squares for the normals.",
+        default: Default::Number(RANK_TOLERANCE),
+        doc: "Share of the largest singular value below which one counts as zero in the least squares for the normals, on at most \
+              200 curves; of no effect on more.",
     },
     Field {
         name: "patches",
@@ -209,7 +213,8 @@ pub static FIELDS: &[Field] = &[
             ),
         ])),
         default: Default::Absent,
-        doc: "Further files beside the result's mesh.",
+        doc: "Further files beside the result's mesh. Patch k is face k of the mesh; its control points 0, 20, 24, 4 are the corners \
+              of that face in the face's order.",
     },
     Field {
         name: "tessellation",

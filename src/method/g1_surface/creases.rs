@@ -206,7 +206,8 @@ pub fn cut(
 }
 
 /// Gives the vertices on creases a normal for each side: that of the side's formula where there is one, the mean of those that
-/// the side's corners name in the file, else one estimated from the side's quads; a notice says so where normals were `given`.
+/// the side's corners name in the file, else one estimated from the side's quads.
+/// Returns the number of vertices, before the cut, at which normals were estimated.
 ///
 /// # Errors
 /// When no normal can be estimated.
@@ -216,10 +217,8 @@ pub fn normals_by_side(
     connectivity: &Connectivity,
     truth: Option<&Truth>,
     corners: Option<&CornerNormals>,
-    given: bool,
     normals: &mut [[f64; 3]],
-    notices: &mut Vec<String>,
-) -> Result<(), String> {
+) -> Result<usize, String> {
     let mut copies = vec![0u32; creases.whole.points.len()];
     for &vertex in &creases.original {
         copies[vertex as usize] += 1;
@@ -235,7 +234,7 @@ pub fn normals_by_side(
                 normals[vertex] = pieces.pieces[piece as usize].normal(mesh.points[vertex]);
             }
         }
-        return Ok(());
+        return Ok(0);
     }
     if let Some(corners) = corners {
         for vertex in (0..normals.len()).filter(|&vertex| on_crease(vertex)) {
@@ -253,7 +252,7 @@ pub fn normals_by_side(
                 }
             }
         }
-        return Ok(());
+        return Ok(0);
     }
     let estimated = vertex_normals::estimate(mesh, connectivity)?;
     // The given normals of a part may all point inward, which is mended later for all of them.
@@ -262,12 +261,5 @@ pub fn normals_by_side(
     for vertex in (0..normals.len()).filter(|&vertex| on_crease(vertex)) {
         normals[vertex] = times(estimated[vertex], if backward[vertex] { -1.0 } else { 1.0 });
     }
-    let replaced = copies.iter().filter(|&&copies| copies > 1).count();
-    if given && replaced > 0 {
-        notices.push(format!(
-            "the normals given at {replaced} vertices on creases belong to no side: replaced there by those estimated from the \
-             quadrilaterals of each side"
-        ));
-    }
-    Ok(())
+    Ok(copies.iter().filter(|&&copies| copies > 1).count())
 }

@@ -132,17 +132,15 @@ impl Problem {
         let mut normals = normals(&mut mesh, &connectivity, truth.as_ref(), settings, &mut notices)?;
         if let Some(creases) = &creases {
             let corners = sources.corners.as_ref();
-            creases::normals_by_side(
-                creases,
-                &mesh,
-                &connectivity,
-                truth.as_ref(),
-                corners,
-                given,
-                &mut normals,
-                &mut notices,
-            )
-            .map_err(|reason| invalid(format!("mesh: {reason}")))?;
+            let estimated =
+                creases::normals_by_side(creases, &mesh, &connectivity, truth.as_ref(), corners, &mut normals)
+                    .map_err(|reason| invalid(format!("mesh: {reason}")))?;
+            if given && estimated > 0 {
+                notices.push(format!(
+                    "the normals given at {estimated} vertices on creases belong to no side: replaced there by those estimated \
+                     from the quadrilaterals of each side"
+                ));
+            }
         }
         Ok(Problem {
             mesh,

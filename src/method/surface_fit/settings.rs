@@ -48,14 +48,14 @@ pub static FIELDS: &[Field] = &[
         ]),
         default: Default::Absent,
         doc: "Factor s along the target's normals (section 3.6 of the paper), or a list with one entry a stage; the last \
-              entry of a shorter list holds on. Preset best: [1, 50], paper: 50.",
+              entry of a shorter list holds on. Preset best: [1, 1, 50], paper: 50.",
     },
     Field {
         name: "regularization",
         kind: Kind::OneOf(&[NUMBERS, Kind::List(&NUMBERS)]),
         default: Default::Absent,
         doc: "Factor lambda of |L X|^2 with the graph Laplacian L of the fitted mesh X, the target scaled to diagonal 1; or a \
-              list with one entry a stage. Preset best: [0.0002, 0.0002], paper: 0.0002.",
+              list with one entry a stage. Preset best: [0.02, 0.002, 0.0002], paper: 0.0002.",
     },
     Field {
         name: "gradient",
@@ -153,13 +153,25 @@ pub static FIELDS: &[Field] = &[
         ]),
         default: Default::Absent,
         doc: "A stage is done when one step lowers the energy by less than this share of it; or a list with one entry a \
-              stage. Preset best: [0.003, 0.0003], paper: 0.0001.",
+              stage. Preset best: [0.003, 0.003, 0.0003], paper: 0.0001.",
     },
     Field {
         name: "gradient_tolerance",
         kind: Kind::Number { min: 0.0, max: 1e12 },
         default: Default::Number(1e-9),
         doc: "A stage is done when the Euclidean norm of the gradient is below this.",
+    },
+    Field {
+        name: "preconditioner",
+        kind: Kind::Choice(&[
+            (
+                "hessian",
+                "both terms with the cells held still, and the regularizer; made anew every five evaluations",
+            ),
+            ("none", "plain L-BFGS, as in the paper"),
+        ]),
+        default: Default::Absent,
+        doc: "The model of the Hessian that L-BFGS starts its own from. Preset best: hessian, paper: none.",
     },
     Field {
         name: "memory",
@@ -209,6 +221,13 @@ pub enum Sampling {
     Tessellation,
 }
 
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Preconditioning {
+    Hessian,
+    None,
+}
+
 /// The settings with nothing left open.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Settings {
@@ -229,6 +248,7 @@ pub struct Settings {
     pub iteration_limit: u64,
     pub change_tolerance: Vec<f64>,
     pub gradient_tolerance: f64,
+    pub preconditioner: Preconditioning,
     pub memory: usize,
     pub feature_angle: f64,
 }
@@ -268,14 +288,19 @@ impl Settings {
         let mut preset = |name: &str, best: Value, paper_value: Value| {
             table.entry(name).or_insert(if paper { paper_value } else { best });
         };
-        preset("anisotropy", Value::from(vec![1.0, 50.0]), Value::from(vec![50.0]));
-        preset("regularization", Value::from(vec![2e-4, 2e-4]), Value::from(vec![2e-4]));
+        preset("anisotropy", Value::from(vec![1.0, 1.0, 50.0]), Value::from(vec![50.0]));
+        preset(
+            "regularization",
+            Value::from(vec![2e-2, 2e-3, 2e-4]),
+            Value::from(vec![2e-4]),
+        );
         preset(
             "change_tolerance",
-            Value::from(vec![3e-3, 3e-4]),
+            Value::from(vec![3e-3, 3e-3, 3e-4]),
             Value::from(vec![1e-4]),
         );
         preset("limit", Value::from(true), Value::from(false));
+        preset("preconditioner", Value::from("hessian"), Value::from("none"));
         for name in SCHEDULES {
             if let Some(value) = table.get_mut(name)
                 && value.is_number()

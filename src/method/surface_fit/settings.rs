@@ -47,15 +47,17 @@ pub static FIELDS: &[Field] = &[
             Kind::List(&Kind::Number { min: 1e-3, max: 1e6 }),
         ]),
         default: Default::Absent,
-        doc: "Factor s along the target's normals (section 3.6 of the paper), or a list with one entry a stage; the last \
-              entry of a shorter list holds on. Preset best: [1, 1, 50], paper: 50.",
+        doc: "Factor s along the target's normals (section 3.6 of the paper): a list with one entry a stage, the last entry \
+              of a shorter list holding on; or a number, which the preset's stages then end with and do not exceed \
+              before. Preset best: [1, 1, 10, 50], paper: 50.",
     },
     Field {
         name: "regularization",
         kind: Kind::OneOf(&[NUMBERS, Kind::List(&NUMBERS)]),
         default: Default::Absent,
-        doc: "Factor lambda of |L X|^2 with the graph Laplacian L of the fitted mesh X, the target scaled to diagonal 1; or a \
-              list with one entry a stage. Preset best: [0.02, 0.002, 0.0002], paper: 0.0002.",
+        doc: "Factor lambda of |L X|^2 with the graph Laplacian L of the fitted mesh X, the target scaled to diagonal 1: a \
+              list with one entry a stage, or a number, which the preset's stages end with and do not go below \
+              before. Preset best: [0.02, 0.002, 0.002, 0.0002], paper: 0.0002.",
     },
     Field {
         name: "gradient",
@@ -153,7 +155,7 @@ pub static FIELDS: &[Field] = &[
         ]),
         default: Default::Absent,
         doc: "A stage is done when one step lowers the energy by less than this share of it; or a list with one entry a \
-              stage. Preset best: [0.003, 0.003, 0.0003], paper: 0.0001.",
+              stage. Preset best: [0.001, 0.0003, 0.001, 0.0003], paper: 0.0001.",
     },
     Field {
         name: "gradient_tolerance",
@@ -261,6 +263,10 @@ pub struct Stage {
     pub change_tolerance: f64,
 }
 
+/// The schedule of the preset `best`: a stiff mesh is drawn near first, then let loose.
+const ANISOTROPY: [f64; 4] = [1.0, 1.0, 10.0, 50.0];
+const REGULARIZATION: [f64; 4] = [2e-2, 2e-3, 2e-3, 2e-4];
+
 /// The settings that may have one entry a stage.
 const SCHEDULES: [&str; 3] = ["anisotropy", "regularization", "change_tolerance"];
 
@@ -285,18 +291,30 @@ impl Settings {
             }
         }
         let paper = table.remove("preset").is_some_and(|preset| preset == "paper");
+        // A number alone is where the schedule leads, unless the other one is a list with stages of its own.
+        let listed = |table: &Map<String, Value>, name: &str| table.get(name).is_some_and(Value::is_array);
+        if !paper && !listed(&table, "anisotropy") && !listed(&table, "regularization") {
+            for (name, schedule) in [("anisotropy", ANISOTROPY), ("regularization", REGULARIZATION)] {
+                if let Some(last) = table.get(name).and_then(Value::as_f64) {
+                    let rises = schedule[0] < schedule[schedule.len() - 1];
+                    let mut stages = schedule.map(|entry| if rises { entry.min(last) } else { entry.max(last) });
+                    stages[schedule.len() - 1] = last;
+                    table.insert(name.to_string(), Value::from(&stages[..]));
+                }
+            }
+        }
         let mut preset = |name: &str, best: Value, paper_value: Value| {
             table.entry(name).or_insert(if paper { paper_value } else { best });
         };
-        preset("anisotropy", Value::from(vec![1.0, 1.0, 50.0]), Value::from(vec![50.0]));
+        preset("anisotropy", Value::from(&ANISOTROPY[..]), Value::from(vec![50.0]));
         preset(
             "regularization",
-            Value::from(vec![2e-2, 2e-3, 2e-4]),
+            Value::from(&REGULARIZATION[..]),
             Value::from(vec![2e-4]),
         );
         preset(
             "change_tolerance",
-            Value::from(vec![3e-3, 3e-3, 3e-4]),
+            Value::from(vec![1e-3, 3e-4, 1e-3, 3e-4]),
             Value::from(vec![1e-4]),
         );
         preset("limit", Value::from(true), Value::from(false));

@@ -133,6 +133,8 @@ fn the_same_records_give_the_same_bytes() {
     let mut rows = sample::rows();
     rows[1].mesh = Some(sample::mesh(4, 0.4));
     let (first, second) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let stored = tempfile::NamedTempFile::new().unwrap();
+    rows[1].files = vec![("notes.txt".into(), stored.path().into())];
     report::write(&sample::experiment(), &rows, rows.len(), first.path()).unwrap();
     for row in &mut rows {
         row.cached = true;

@@ -112,6 +112,7 @@ impl Method for Behaving {
             stop: "converged".into(),
             metrics: [("value".to_string(), value)].into(),
             mesh: Some(b"mesh".to_vec()),
+            files: [("notes.txt".to_string(), b"notes".to_vec())].into(),
             ..Outcome::default()
         })
     }
@@ -647,7 +648,9 @@ fn damage_is_told_and_computed_again() {
     let options = options(folder.path());
     let plan = plan(&behaviours(&["well"]), Limits::default(), UNTIMED);
     let run = run_plan(&plan, &options, &mut Nobody).unwrap();
-    std::fs::write(options.store.entry(&record(&run, 0).key).join(MESH), b"mosh").unwrap();
+    let entry = options.store.entry(&record(&run, 0).key);
+    assert_eq!(std::fs::read(entry.join("notes.txt")).unwrap(), b"notes");
+    std::fs::write(entry.join(MESH), b"mosh").unwrap();
     let run = run_plan(&plan, &options, &mut Nobody).unwrap();
     assert!(
         run.warnings[0].contains("is damaged (mesh.vtu has SHA-256"),

@@ -125,6 +125,7 @@ pub fn row(name: &str, axes: &[(&str, Value)], metrics: &[(&str, f64)]) -> Row {
         },
         cached: false,
         mesh: None,
+        files: Vec::new(),
     }
 }
 

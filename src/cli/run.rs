@@ -242,9 +242,12 @@ pub(super) fn rows(plan: &Plan, store: &Store, finished: Vec<Finished>) -> Vec<R
             read.map_err(|error| eprintln!("warning: {}: the result mesh cannot be read: {error}", job.name))
                 .ok()
         });
+        let further = record.result.artifacts.keys().filter(|name| *name != MESH);
+        let files = further.map(|name| (name.clone(), store.entry(&record.key).join(name)));
         Row {
             name: job.name.clone(),
             axes: job.axes.clone(),
+            files: files.collect(),
             record,
             cached: finished.cached,
             mesh,

@@ -18,4 +18,6 @@ pub mod batches;
 pub mod volume_energy;
 pub mod boundary;
 pub mod certificate;
+pub mod lagrange;
+pub mod coefficient_file;
 pub mod bernstein_hexahedron;

@@ -46,6 +46,9 @@ pub struct Outcome {
     pub notices: Vec<String>,
     /// The result mesh as bytes of a VTU file, with the fields that pictures can be coloured by.
     pub mesh: Option<Vec<u8>>,
+    /// Further files by what follows the job's name in theirs: `bezier.vtu`, `control-points.txt`. Lowercase letters,
+    /// digits, `-` and `.` only.
+    pub files: BTreeMap<String, Vec<u8>>,
 }
 
 /// A computation that could not be done at all: a record with a reason, never a gap.

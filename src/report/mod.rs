@@ -27,6 +27,8 @@ use std::path::{Path, PathBuf};
 pub enum ReportError {
     /// A folder or file could not be written.
     Write(PathBuf, std::io::Error),
+    /// A file of a stored result could not be read.
+    Read(PathBuf, std::io::Error),
     /// A CSV file could not be composed.
     Csv(String, String),
     /// A plot could not be drawn.
@@ -39,6 +41,7 @@ impl std::fmt::Display for ReportError {
     fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             ReportError::Write(path, error) => write!(formatter, "cannot write {}: {error}", path.display()),
+            ReportError::Read(path, error) => write!(formatter, "cannot read {}: {error}", path.display()),
             ReportError::Csv(name, error) => write!(formatter, "cannot compose {name}: {error}"),
             ReportError::Plot(name, error) => write!(formatter, "cannot draw the plot {name}: {error}"),
             ReportError::Picture(name, error) => write!(formatter, "cannot draw the result of {name}: {error}"),
@@ -79,6 +82,10 @@ pub fn write(experiment: &Experiment, rows: &[Row], planned: usize, folder: &Pat
     for row in rows {
         if let Some(mesh) = &row.mesh {
             publish(&format!("{}.vtu", row.name), mesh)?;
+        }
+        for (name, path) in &row.files {
+            let bytes = std::fs::read(path).map_err(|error| ReportError::Read(path.clone(), error))?;
+            publish(&format!("{}.{name}", row.name), &bytes)?;
         }
     }
     let verdicts = gate::judge(experiment, rows, &fits);

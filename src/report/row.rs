@@ -5,6 +5,7 @@ use crate::experiment::file::{Condition, Experiment};
 use crate::experiment::record::{MEASUREMENTS, Record, Status};
 use crate::metric::Better;
 use serde_json::Value;
+use std::path::PathBuf;
 
 const MEBIBYTE: f64 = 1_048_576.0;
 
@@ -20,6 +21,8 @@ pub struct Row {
     pub cached: bool,
     /// The result mesh as bytes of a VTU file.
     pub mesh: Option<Vec<u8>>,
+    /// Where the result's further files are, by what follows the job's name in theirs.
+    pub files: Vec<(String, PathBuf)>,
 }
 
 impl Row {

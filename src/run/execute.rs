@@ -7,7 +7,7 @@ use super::event::Progress;
 use super::interrupt::Interrupt;
 use super::protocol::{Effort, Message};
 use super::provenance;
-use super::store::fingerprint;
+use super::store::{Artifacts, MESH, fingerprint};
 use crate::experiment::job::{Job, JobPart, sha256};
 use crate::experiment::record::{JobResult, Measurement, Phase, Status};
 use crate::method::model::{LoadedModel, Part};
@@ -24,8 +24,8 @@ use std::time::{Duration, Instant};
 #[derive(Debug)]
 pub struct Computed {
     pub result: JobResult,
-    /// The result mesh as a VTU file.
-    pub mesh: Option<Vec<u8>>,
+    /// The files of the result by name: the mesh under [`MESH`], and what else the method wrote.
+    pub files: Artifacts,
     pub measurement: Measurement,
     /// Fingerprints of the first repetition and of one that differs from it.
     pub differing: Option<(String, String)>,
@@ -162,10 +162,10 @@ pub fn execute(
         Ok(pool) => pool,
         Err(error) => {
             let reason = format!("cannot start {} threads: {error}", bounds.effort.threads);
-            return computed(failure("not-started", reason), None, measurement, None);
+            return computed(failure("not-started", reason), Artifacts::new(), measurement, None);
         }
     };
-    let mut first: Option<(JobResult, Option<Vec<u8>>)> = None;
+    let mut first: Option<(JobResult, Artifacts)> = None;
     let mut times: Vec<Times> = Vec::new();
     let mut differing = None;
     for repetition in 0..bounds.effort.repeat.max(1) {
@@ -185,10 +185,10 @@ pub fn execute(
         if cancelled || bounds.interrupt.is_set() {
             return Ending::Cancelled;
         }
-        let (result, mesh) = match returned {
+        let (result, files) = match returned {
             _ if stopped.is_some() => (
                 time_limit(bounds.seconds, stopped.as_ref().map_or("", |(_, phase)| phase)),
-                None,
+                Artifacts::new(),
             ),
             Ok(Ok(outcome)) => done(outcome),
             Ok(Err(refusal)) => {
@@ -196,14 +196,14 @@ pub fn execute(
                     status: Status::Refused,
                     ..failure(&refusal.kind, refusal.reason)
                 };
-                (refused, None)
+                (refused, Artifacts::new())
             }
-            Err(payload) => (failure("panicked", panic_reason(payload.as_ref())), None),
+            Err(payload) => (failure("panicked", panic_reason(payload.as_ref())), Artifacts::new()),
         };
         let go_on = result.status != Status::Failed;
         match &first {
-            None => first = Some((result, mesh)),
-            Some(_) if !go_on => first = Some((result, None)),
+            None => first = Some((result, files)),
+            Some(_) if !go_on => first = Some((result, Artifacts::new())),
             Some((former, _)) => {
                 let fingerprints = (fingerprint(former), fingerprint(&result));
                 if fingerprints.0 != fingerprints.1 {
@@ -225,28 +225,29 @@ pub fn execute(
     }
     measurement.peak_memory = provenance::peak_memory();
     match first {
-        Some((result, mesh)) => computed(result, mesh, measurement, differing),
+        Some((result, files)) => computed(result, files, measurement, differing),
         None => Ending::Cancelled,
     }
 }
 
 fn computed(
     result: JobResult,
-    mesh: Option<Vec<u8>>,
+    files: Artifacts,
     measurement: Measurement,
     differing: Option<(String, String)>,
 ) -> Ending {
     Ending::Computed(Box::new(Computed {
         result,
-        mesh,
+        files,
         measurement,
         differing,
     }))
 }
 
-fn done(outcome: Outcome) -> (JobResult, Option<Vec<u8>>) {
-    let mesh = outcome.mesh;
-    let artifacts = mesh.iter().map(|bytes| (super::store::MESH.to_string(), sha256(bytes)));
+fn done(outcome: Outcome) -> (JobResult, Artifacts) {
+    let mut files = outcome.files;
+    files.extend(outcome.mesh.map(|bytes| (MESH.to_string(), bytes)));
+    let artifacts = files.iter().map(|(name, bytes)| (name.clone(), sha256(bytes)));
     let result = JobResult {
         status: Status::Done,
         stop: outcome.stop,
@@ -257,7 +258,7 @@ fn done(outcome: Outcome) -> (JobResult, Option<Vec<u8>>) {
         notices: outcome.notices,
         artifacts: artifacts.collect(),
     };
-    (result, mesh)
+    (result, files)
 }
 
 /// `phase` may be empty, where the method named none.

@@ -7,10 +7,9 @@ use super::execute::{Bounds, Computed, Ending, catch_panics_quietly, execute, fa
 use super::interrupt::Interrupt;
 use super::protocol::{Message, Request};
 use super::provenance;
-use super::store::{Lock, Lookup, MESH, Publication, Sharing, Store};
+use super::store::{Lock, Lookup, Publication, Sharing, Store};
 use crate::experiment::record::{JobResult, Record, Status};
 use crate::method::Method;
-use std::collections::BTreeMap;
 use std::io::{Read, Write};
 use std::time::Duration;
 
@@ -175,7 +174,7 @@ fn compute(
     };
     let Computed {
         mut result,
-        mesh,
+        files,
         measurement,
         differing,
     } = computed;
@@ -193,11 +192,10 @@ fn compute(
     if result.status == Status::Failed {
         return finished(record(result, measurement));
     }
-    let artifacts: BTreeMap<String, Vec<u8>> = mesh.into_iter().map(|bytes| (MESH.to_string(), bytes)).collect();
     let made = record(result.clone(), measurement.clone());
     // A better measurement takes the stored one's place; a worse one is not kept.
     let replace = request.force || request.effort.exclusive || request.effort.repeat > 1;
-    match store.publish(&made, &artifacts, replace) {
+    match store.publish(&made, &files, replace) {
         Ok(Publication::New | Publication::Remeasured) => finished(made),
         Ok(Publication::AlreadyThere(stored)) => Message::Finished {
             record: stored,

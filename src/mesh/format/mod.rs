@@ -12,7 +12,7 @@ mod cells;
 mod numbers;
 mod text;
 
-mod gmsh;
+pub mod gmsh;
 mod medit;
 mod mfem;
 mod obj;

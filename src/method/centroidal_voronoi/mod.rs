@@ -226,5 +226,6 @@ pub fn run(
         ]),
         notices,
         mesh: Some(mesh),
+        files: Default::default(),
     })
 }

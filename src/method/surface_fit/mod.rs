@@ -232,5 +232,6 @@ pub fn run(problem: &Problem, settings: &Settings, observer: &mut dyn Observer) 
         .into(),
         notices,
         mesh: Some(measured.mesh),
+        files: Default::default(),
     })
 }

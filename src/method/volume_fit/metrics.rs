@@ -145,6 +145,31 @@ pub static ALL: &[Metric] = &[
          edges: 0 for a uniform map.",
     ),
     metric(
+        "thickness_error_mean",
+        "e_mean",
+        "%",
+        Some(0.0),
+        Better::Lower,
+        "Mean over the outermost vertices of a shell of |distance from the surface - prescribed distance|, in per cent of the \
+         prescribed one; not-a-number without a shell.",
+    ),
+    metric(
+        "thickness_error_rms",
+        "e_rms",
+        "%",
+        Some(0.0),
+        Better::Lower,
+        "Root mean square of these errors.",
+    ),
+    metric(
+        "thickness_error_max",
+        "e_max",
+        "%",
+        Some(0.0),
+        Better::Lower,
+        "Largest of these errors.",
+    ),
+    metric(
         "energy",
         "E",
         "",

@@ -1,5 +1,6 @@
 //! What a model of a volume fit may be: a template with the recipe that shapes it, and the surface it is fitted to.
 
+use super::shell::SIDES;
 use crate::mesh::generate;
 use crate::method::model::{Generator, ModelKind, Role, fields, keep};
 use crate::method::setting::{Default, Field, Kind};
@@ -192,6 +193,30 @@ static KIND: LazyLock<ModelKind> = LazyLock::new(|| {
             doc: "The cubes whose centres lie within the target, made a manifold.",
         },
     ];
+    templates.push(Generator {
+        name: "shell",
+        parameters: keep(vec![
+            Field {
+                name: "distance",
+                kind: Kind::Number { min: 1e-3, max: 100.0 },
+                default: Default::Number(2.0),
+                doc: "Thickness of all layers of a side together, in per cent of the diagonal of the target's box.",
+            },
+            Field {
+                name: "layers",
+                kind: Kind::Integer { min: 1, max: 100 },
+                default: Default::Integer(2),
+                doc: "Layers on each side.",
+            },
+            Field {
+                name: "side",
+                kind: Kind::Choice(SIDES),
+                default: Default::Text("both"),
+                doc: "Where layers are grown.",
+            },
+        ]),
+        doc: "Layers of prisms on the target's triangles, which keep their places; the rest is not fitted.",
+    });
     for generator in generate::generators() {
         let mut own = Vec::new();
         for field in fields(generator.parameters) {
@@ -272,6 +297,10 @@ static KIND: LazyLock<ModelKind> = LazyLock::new(|| {
         ),
         shape("bone", vec![], "A shaft with two thick ends, smooth."),
         shape("tooth", vec![], "A rounded block with four cusps on top, smooth."),
+        shape("hanger", vec![], "A flat ring with a hook: smooth, of genus 1."),
+        shape("hand", vec![], "A palm with a thumb and four fingers, smooth."),
+        shape("relief", vec![], "A slab with a hill and waves on top, smooth."),
+        shape("figure", vec![], "A body with legs, arms and a head, smooth."),
     ];
     ModelKind {
         roles: keep(vec![

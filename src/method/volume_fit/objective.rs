@@ -1,5 +1,6 @@
 //! What a fit minimizes: `E = E_S + lambda E_Omega` over the nodes (Jin et al. 2013, equation 1).
 
+use super::chart::Chart;
 use super::preconditioner::Preconditioner;
 use super::surface_energy::SurfaceEnergy;
 use crate::fem::boundary::Boundary;
@@ -30,11 +31,15 @@ pub struct FitObjective<'a> {
     pub samples: Vec<[f64; 3]>,
     pub forces: Vec<[f64; 3]>,
     pub room: Vec<f64>,
+    /// What the unknowns stand for; the nodes themselves when absent.
+    pub chart: Option<&'a Chart>,
+    /// Nodes of the unknowns, and the gradient by them.
+    pub nodes: [Vec<f64>; 2],
 }
 
 impl Objective for FitObjective<'_> {
     fn dimension(&self) -> usize {
-        3 * self.volume.nodes()
+        self.chart.map_or(3 * self.volume.nodes(), Chart::unknowns)
     }
 
     fn value(&mut self, x: &[f64]) -> f64 {
@@ -46,6 +51,33 @@ impl Objective for FitObjective<'_> {
     }
 
     fn gradient(&mut self, x: &[f64], gradient: &mut [f64]) -> f64 {
+        let Some(chart) = self.chart else {
+            return self.at_nodes(x, gradient);
+        };
+        let [mut nodes, mut forces] = std::mem::take(&mut self.nodes);
+        nodes.resize(3 * self.volume.nodes(), 0.0);
+        forces.resize(nodes.len(), 0.0);
+        chart.expand(x, &mut nodes);
+        let value = self.at_nodes(&nodes, &mut forces);
+        chart.restrict(&forces, gradient);
+        self.nodes = [nodes, forces];
+        value
+    }
+
+    fn is_preconditioned(&self) -> bool {
+        self.preconditioner.is_some()
+    }
+
+    fn precondition(&mut self, vector: &mut [f64]) {
+        if let Some(preconditioner) = &mut self.preconditioner {
+            preconditioner.apply(vector);
+        }
+    }
+}
+
+impl FitObjective<'_> {
+    /// The value, and the gradient by the nodes.
+    fn at_nodes(&mut self, x: &[f64], gradient: &mut [f64]) -> f64 {
         gradient.fill(0.0);
         let volume = self.volume.add_gradient(x, self.lambda, gradient);
         if !volume.value.is_finite() || volume.least_determinant < self.floor.get() {
@@ -68,15 +100,5 @@ impl Objective for FitObjective<'_> {
         }
         self.latest.set(parts);
         parts.surface + self.lambda * parts.volume
-    }
-
-    fn is_preconditioned(&self) -> bool {
-        self.preconditioner.is_some()
-    }
-
-    fn precondition(&mut self, vector: &mut [f64]) {
-        if let Some(preconditioner) = &mut self.preconditioner {
-            preconditioner.apply(vector);
-        }
     }
 }

@@ -1,5 +1,6 @@
 //! The settings of a volume fit: their declaration as data, and the typed form that the computation reads.
 
+use super::files::FILES;
 use crate::energy;
 use crate::fem::basis;
 use crate::fem::quadrature::{RULES, Rule};
@@ -31,6 +32,9 @@ const ORDER: Kind = Kind::Integer {
     min: 1,
     max: HIGHEST_ORDER as i64,
 };
+
+/// A file of the result.
+static FILE: Kind = Kind::Choice(FILES);
 
 /// A stage of the schedule.
 static STAGE: &[Field] = &[
@@ -250,6 +254,26 @@ pub static FIELDS: &[Field] = &[
         doc: "How often, at most, a fit with elements that are invalid between quadrature points is gone on with, with more \
               points. Preset best: 3, paper: 0.",
     },
+    Field {
+        name: "subdivision_levels",
+        kind: Kind::Integer { min: 0, max: 6 },
+        default: Default::Integer(0),
+        doc: "Fit a subdivision volume: the control points of so many levels of multi-linear averaging, level by level, with \
+              trilinear hexahedra; 0 fits elements. Needs order 1.",
+    },
+    Field {
+        name: "crease_angle",
+        kind: Kind::Number { min: 0.0, max: 180.0 },
+        default: Default::Number(40.0),
+        doc: "Edges of a subdivision's template bent by more than this, in degrees, stay creases; 180 keeps none.",
+    },
+    Field {
+        name: "files",
+        kind: Kind::List(&FILE),
+        default: Default::Absent,
+        doc: "Files beside the picture: lagrange, gmsh, coefficients. All when absent and there are at most 300000 nodes, else \
+              the coefficients alone.",
+    },
 ];
 
 /// A stage.
@@ -287,6 +311,10 @@ pub struct Settings {
     pub change_tolerance: f64,
     pub untangle: bool,
     pub repairs: usize,
+    pub levels: usize,
+    pub crease_angle: f64,
+    /// Nothing when the file leaves it open.
+    pub files: Option<Vec<String>>,
 }
 
 /// Raising single orders.
@@ -409,6 +437,13 @@ impl Settings {
                 stage.order
             )));
         }
+        let levels = number("subdivision_levels") as usize;
+        if let Some(stage) = stages.iter().find(|stage| levels > 0 && stage.order > 1) {
+            return Err(invalid(format!(
+                "a subdivision volume has trilinear hexahedra; order is {}, set order = 1",
+                stage.order
+            )));
+        }
         let energy = energy::find(&text("energy")).filter(|energy| energy.is_barrier());
         let basis = basis::find(&chosen("basis"));
         let rule = RULES.iter().find(|rule| rule.0 == chosen("quadrature"));
@@ -453,6 +488,12 @@ impl Settings {
                 .and_then(Value::as_f64)
                 .unwrap_or(if paper { 0.0 } else { 1e-5 }),
             untangle: flag("untangle"),
+            levels,
+            crease_angle: number("crease_angle"),
+            files: settings.get("files").and_then(Value::as_array).map(|names| {
+                let words = names.iter().filter_map(Value::as_str).map(str::to_owned);
+                words.collect()
+            }),
             repairs: whole("repairs").unwrap_or(if paper { 0 } else { 3 }),
         })
     }
@@ -512,6 +553,9 @@ fn default_schedule(
 /// Checks that go across fields.
 pub fn check(settings: &Value) -> Vec<(String, String)> {
     match Settings::resolve(settings) {
+        Err(failure) if settings.get("subdivision_levels").and_then(Value::as_u64).unwrap_or(0) > 0 => {
+            vec![("subdivision_levels".to_string(), failure.reason)]
+        }
         Err(failure) if settings.get("schedule").is_some() => vec![("schedule".to_string(), failure.reason)],
         _ => Vec::new(),
     }

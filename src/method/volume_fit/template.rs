@@ -1,6 +1,9 @@
 //! The template: read or generated, shaped by its recipe, laid into the target.
 
+use super::shell::{self, Shell};
 use super::target::Target;
+use crate::fem::basis::Basis;
+use crate::fem::coefficient_file;
 use crate::mesh::format;
 use crate::mesh::mixed::MixedMesh;
 use crate::mesh::template::{carve, collapse, extrude, grid, pillow, voxels};
@@ -23,7 +26,9 @@ const MOST_CELLS: usize = 4_000_000;
 ///
 /// # Errors
 /// `invalid-input` for a file that holds no volume, a recipe that cannot be followed, or a mesh that is not valid.
-pub fn read(part: &Part, target: Option<&Target>, notices: &mut Vec<String>) -> Result<MixedMesh, Failure> {
+pub fn read(part: &Part, target: Option<&Target>, notices: &mut Vec<String>) -> Result<Template, Failure> {
+    let mut map = None;
+    let mut shell = None;
     let (mut mesh, parameters, generated) = match part {
         Part::Generated { generator, parameters } => {
             let count =
@@ -46,6 +51,18 @@ pub fn read(part: &Part, target: Option<&Target>, notices: &mut Vec<String>) -> 
                     };
                     voxels::voxels(&target.surface, count("along", 8)).map_err(invalid)?
                 }
+                "shell" => {
+                    let Some(target) = target else {
+                        return Err(invalid("a shell needs a target surface to grow on".to_string()));
+                    };
+                    let percent = parameters.get("distance").and_then(Value::as_f64).unwrap_or(2.0);
+                    let side = parameters.get("side").and_then(Value::as_str).unwrap_or("both");
+                    let distance = 0.01 * percent * diagonal(&target.surface.points);
+                    let (mesh, grown) =
+                        shell::grow(&target.surface, distance, count("layers", 2), side).map_err(invalid)?;
+                    shell = Some(grown);
+                    mesh
+                }
                 name => {
                     let mut table = parameters.clone();
                     if let Some(table) = table.as_object_mut() {
@@ -60,20 +77,36 @@ pub fn read(part: &Part, target: Option<&Target>, notices: &mut Vec<String>) -> 
                     }
                 }
             };
-            (mesh, parameters, generator != "voxels")
+            (mesh, parameters, generator != "voxels" && generator != "shell")
         }
         Part::File {
             name,
             bytes,
             parameters,
         } => {
-            let content = format::read(name, bytes).map_err(|error| invalid(error.to_string()))?;
-            notices.extend(content.notices.iter().map(|notice| format!("template: {notice}")));
-            let (mut mesh, found) = MixedMesh::from_content(&content).map_err(invalid)?;
-            notices.extend(found.into_iter().map(|notice| format!("template: {notice}")));
+            let mut mesh = if coefficient_file::sniff(bytes) {
+                let volume = coefficient_file::read(bytes).map_err(|reason| invalid(format!("{name}: {reason}")))?;
+                if parameters.get("recipe").is_some() {
+                    return Err(invalid(format!(
+                        "{name}: a recipe shapes straight cells, not the curved ones of a coefficient file; remove `recipe`"
+                    )));
+                }
+                map = Some(Map {
+                    basis: volume.basis,
+                    orders: volume.orders,
+                    x: volume.x,
+                });
+                volume.mesh
+            } else {
+                let content = format::read(name, bytes).map_err(|error| invalid(error.to_string()))?;
+                notices.extend(content.notices.iter().map(|notice| format!("template: {notice}")));
+                let (mesh, found) = MixedMesh::from_content(&content).map_err(invalid)?;
+                notices.extend(found.into_iter().map(|notice| format!("template: {notice}")));
+                mesh
+            };
             let scale = parameters.get("scale").and_then(Value::as_f64).unwrap_or(1.0);
-            for point in &mut mesh.points {
-                *point = point.map(|coordinate| coordinate * scale);
+            if scale != 1.0 {
+                transform(&mut mesh, &mut map, [scale; 3], [0.0; 3]);
             }
             (mesh, parameters, false)
         }
@@ -87,12 +120,45 @@ pub fn read(part: &Part, target: Option<&Target>, notices: &mut Vec<String>) -> 
     if let Some(target) = target {
         lay(
             &mut mesh,
+            &mut map,
             target,
             place.unwrap_or(if generated { "box" } else { "none" }),
         )
         .map_err(invalid)?;
     }
-    Ok(mesh)
+    Ok(Template { mesh, map, shell })
+}
+
+/// A template: its cells, and the map over them where they are curved.
+#[derive(Clone)]
+pub struct Template {
+    pub mesh: MixedMesh,
+    pub map: Option<Map>,
+    /// What the cells strive for where they are layers on a surface.
+    pub shell: Option<Shell>,
+}
+
+/// A map over a template as a coefficient file gives it.
+#[derive(Clone)]
+pub struct Map {
+    pub basis: &'static dyn Basis,
+    pub orders: Vec<usize>,
+    /// Three numbers a node; those of the vertices are their places.
+    pub x: Vec<f64>,
+}
+
+/// Applies `factors * point + offset`: edges, faces and cells bend by differences, which the offset leaves alone.
+pub fn transform(mesh: &mut MixedMesh, map: &mut Option<Map>, factors: [f64; 3], offset: [f64; 3]) {
+    for point in &mut mesh.points {
+        *point = std::array::from_fn(|axis| factors[axis] * point[axis] + offset[axis]);
+    }
+    if let Some(map) = map {
+        let (vertices, rest) = map.x.split_at_mut(3 * mesh.points.len());
+        vertices.copy_from_slice(mesh.points.as_flattened());
+        for (place, value) in rest.iter_mut().enumerate() {
+            *value *= factors[place % 3];
+        }
+    }
 }
 
 /// One operation of a recipe.
@@ -125,7 +191,7 @@ fn apply(mesh: &MixedMesh, operation: &Value) -> Result<MixedMesh, String> {
 }
 
 /// Lays the template into the target's box.
-fn lay(mesh: &mut MixedMesh, target: &Target, place: &str) -> Result<(), String> {
+fn lay(mesh: &mut MixedMesh, map: &mut Option<Map>, target: &Target, place: &str) -> Result<(), String> {
     let points = if target.surface.points.is_empty() {
         &target.sites
     } else {
@@ -142,10 +208,8 @@ fn lay(mesh: &mut MixedMesh, target: &Target, place: &str) -> Result<(), String>
     if !factors.iter().all(|factor| factor.is_finite() && *factor > 0.0) {
         return Err("the target or the template is flat along an axis; use place = \"scale\" or \"none\"".to_string());
     }
-    for point in &mut mesh.points {
-        *point = std::array::from_fn(|axis| {
-            0.5 * (low[axis] + high[axis]) + factors[axis] * (point[axis] - 0.5 * (from[axis] + to[axis]))
-        });
-    }
+    let offset =
+        std::array::from_fn(|axis| 0.5 * (low[axis] + high[axis]) - factors[axis] * 0.5 * (from[axis] + to[axis]));
+    transform(mesh, map, factors, offset);
     Ok(())
 }

@@ -3,9 +3,10 @@
 //!
 //! Success is judged at the quadrature points. Not guaranteed: success.
 
+use super::fit::Fit;
+use super::invalid;
 use super::objective::{FitObjective, Parts};
 use super::surface_energy::SurfaceEnergy;
-use super::{Fit, invalid};
 use crate::energy::mapping::Density;
 use crate::energy::untangling::Untangling;
 use crate::fem::boundary::Boundary;
@@ -77,6 +78,8 @@ pub(super) fn untangle(fit: &mut Fit<'_>, observer: &mut dyn Observer) -> Result
             samples: Vec::new(),
             forces: Vec::new(),
             room: Vec::new(),
+            chart: None,
+            nodes: Default::default(),
         };
         let lbfgs = Lbfgs {
             stopping: Stopping {

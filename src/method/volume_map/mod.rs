@@ -341,6 +341,7 @@ fn finish(
         counters: counters.0,
         notices,
         mesh: Some(measured.mesh),
+        files: Default::default(),
     })
 }
 

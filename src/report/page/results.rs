@@ -238,12 +238,10 @@ fn card(experiment: &Experiment, row: &Row, picture: &str) -> String {
         }
         text.push_str("</details>");
     }
-    if row.mesh.is_some() {
-        let _ = write!(
-            text,
-            "<p class=\"foot\"><a href=\"{0}.vtu\">{0}.vtu</a></p>",
-            escape(&row.name)
-        );
+    let mesh = row.mesh.iter().map(|_| "vtu");
+    for ending in mesh.chain(row.files.iter().map(|(name, _)| name.as_str())) {
+        let file = escape(&format!("{}.{ending}", row.name));
+        let _ = write!(text, "<p class=\"foot\"><a href=\"{file}\">{file}</a></p>");
     }
     text.push_str("</article>");
     text

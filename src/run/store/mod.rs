@@ -1,7 +1,7 @@
 //! The store: every finished job's record and artifacts under the job's key, published whole and verified when read.
 //!
 //! ```text
-//! <root>/<aa>/<key>/{record.json, mesh.vtu, manifest.json}    aa: the first two digits of the key
+//! <root>/<aa>/<key>/{record.json, mesh.vtu, manifest.json, ...}    aa: the first two digits of the key
 //! <root>/failures/<key>.json    crashes and limits: shown in reports, tried again by the next run
 //! <root>/quarantine/            damaged entries, and results that contradict a stored one
 //! <root>/locks/                 one process computes, the others wait
@@ -28,6 +28,7 @@ pub use upkeep::{Damage, Garbage, GarbageKind, Statistics};
 use crate::experiment::job::{Key, sha256};
 use crate::experiment::record::{JobResult, RECORD_SCHEMA, Record};
 use manifest::Manifest;
+use std::collections::BTreeMap;
 use std::fs::{File, Permissions};
 use std::io;
 use std::os::unix::fs::{MetadataExt, PermissionsExt};
@@ -38,6 +39,9 @@ pub const RECORD: &str = "record.json";
 /// The result mesh's name within an entry.
 pub const MESH: &str = "mesh.vtu";
 const MANIFEST: &str = "manifest.json";
+
+/// Files of a result by their name within an entry.
+pub type Artifacts = BTreeMap<String, Vec<u8>>;
 
 /// A folder of results by key.
 #[derive(Clone, Debug)]

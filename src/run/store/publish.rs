@@ -1,7 +1,9 @@
 //! Publishing: written beside, synced, renamed into place, synced again; the manifest last.
 
 use super::manifest::{FileEntry, Manifest};
-use super::{Lookup, MANIFEST, RECORD, Store, StoreError, failed, fingerprint, fresh, is_key, sha256, unused};
+use super::{
+    Artifacts, Lookup, MANIFEST, RECORD, Store, StoreError, failed, fingerprint, fresh, is_key, sha256, unused,
+};
 use crate::experiment::record::Record;
 use std::collections::BTreeMap;
 use std::fs::{File, Permissions};
@@ -54,12 +56,7 @@ impl Store {
     ///
     /// Where an entry is already there, it stays, unless `replace` asks for the new measurement to take its place; and
     /// even then times that were taken exclusively do not give way to as many that were not.
-    pub fn publish(
-        &self,
-        record: &Record,
-        artifacts: &BTreeMap<String, Vec<u8>>,
-        replace: bool,
-    ) -> Result<Publication, StoreError> {
+    pub fn publish(&self, record: &Record, artifacts: &Artifacts, replace: bool) -> Result<Publication, StoreError> {
         self.publish_in_steps(record, artifacts, replace, &mut |_| Ok(()))
     }
 
@@ -67,7 +64,7 @@ impl Store {
     pub fn publish_in_steps(
         &self,
         record: &Record,
-        artifacts: &BTreeMap<String, Vec<u8>>,
+        artifacts: &Artifacts,
         replace: bool,
         step: &mut dyn FnMut(&Step) -> io::Result<()>,
     ) -> Result<Publication, StoreError> {
@@ -100,7 +97,7 @@ impl Store {
         &self,
         folder: &Path,
         record: &Record,
-        artifacts: &BTreeMap<String, Vec<u8>>,
+        artifacts: &Artifacts,
         step: &mut dyn FnMut(&Step) -> io::Result<()>,
     ) -> Result<(), StoreError> {
         let mut bytes = serde_json::to_vec_pretty(record)

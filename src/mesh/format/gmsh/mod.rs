@@ -4,6 +4,7 @@
 //! and lines among the elements, names of groups, periodicity and the like are left out with a notice.
 //! Source: the Gmsh reference manual 4.13, section "File formats".
 
+pub mod curved;
 mod version_2;
 mod version_4;
 

@@ -12,6 +12,16 @@ const BLOCK: usize = 1 << 15;
 /// A field as it is written: its name, the numbers per row, and the rows one after the other.
 pub type FieldView<'a> = (&'a str, usize, &'a [f64]);
 
+/// Points and cells of a document, the cells by their corners one after the other.
+pub(super) struct Body<'a> {
+    pub points: &'a [[f64; 3]],
+    pub corners: &'a [u32],
+    /// Where each cell's corners end.
+    pub ends: &'a [i64],
+    /// VTK's number of each cell's kind.
+    pub types: &'a [u8],
+}
+
 /// A VTU file of `points`, `cells` and fields with one row a point or a cell (cells in the order of [`Content`]).
 ///
 /// # Panics
@@ -22,20 +32,43 @@ pub fn write(
     point_data: &[FieldView<'_>],
     cell_data: &[FieldView<'_>],
 ) -> Vec<u8> {
+    let corners: Vec<u32> = cells.iter().flat_map(|(_, corners)| corners.to_vec()).collect();
+    let ends = cells.iter().scan(0_i64, |end, (_, corners)| {
+        *end += corners.len() as i64;
+        Some(*end)
+    });
+    let ends: Vec<i64> = ends.collect();
+    let types: Vec<u8> = cells.iter().map(|(kind, _)| vtk::code(kind)).collect();
+    let body = Body {
+        points,
+        corners: &corners,
+        ends: &ends,
+        types: &types,
+    };
+    document("1.0", &body, point_data, cell_data)
+}
+
+/// The whole file.
+pub(super) fn document(
+    version: &str,
+    body: &Body<'_>,
+    point_data: &[FieldView<'_>],
+    cell_data: &[FieldView<'_>],
+) -> Vec<u8> {
     let mut out = String::new();
     // Writing to a string cannot fail.
     let _ = write!(
         out,
         "<?xml version=\"1.0\"?>\n\
-         <VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\" \
+         <VTKFile type=\"UnstructuredGrid\" version=\"{version}\" byte_order=\"LittleEndian\" header_type=\"UInt64\" \
          compressor=\"vtkZLibDataCompressor\">\n\
          <UnstructuredGrid>\n<Piece NumberOfPoints=\"{}\" NumberOfCells=\"{}\">\n",
-        points.len(),
-        cells.count()
+        body.points.len(),
+        body.types.len()
     );
     for (part, rows, fields) in [
-        ("PointData", points.len(), point_data),
-        ("CellData", cells.count(), cell_data),
+        ("PointData", body.points.len(), point_data),
+        ("CellData", body.types.len(), cell_data),
     ] {
         let _ = writeln!(out, "<{part}>");
         for &(name, components, values) in fields {
@@ -55,30 +88,21 @@ pub fn write(
         let _ = writeln!(out, "</{part}>");
     }
     out.push_str("<Points>\n");
-    let coordinates = points.as_flattened().iter().flat_map(|value| value.to_le_bytes());
+    let coordinates = body.points.as_flattened().iter().flat_map(|value| value.to_le_bytes());
     write_array(&mut out, "Points", "Float64", 3, coordinates);
     out.push_str("</Points>\n<Cells>\n");
-    let corners = cells.iter().flat_map(|(_, corners)| corners);
+    let corners = body.corners.iter();
     // VTK takes the type that the file names; half the bytes where indices fit.
-    if points.len() <= i32::MAX as usize {
+    if body.points.len() <= i32::MAX as usize {
         let bytes = corners.flat_map(|&corner| (corner as i32).to_le_bytes());
         write_array(&mut out, "connectivity", "Int32", 1, bytes);
     } else {
         let bytes = corners.flat_map(|&corner| i64::from(corner).to_le_bytes());
         write_array(&mut out, "connectivity", "Int64", 1, bytes);
     }
-    let offsets = cells.iter().scan(0_i64, |end, (_, corners)| {
-        *end += corners.len() as i64;
-        Some(*end)
-    });
-    write_array(&mut out, "offsets", "Int64", 1, offsets.flat_map(i64::to_le_bytes));
-    write_array(
-        &mut out,
-        "types",
-        "UInt8",
-        1,
-        cells.iter().map(|(kind, _)| vtk::code(kind)),
-    );
+    let ends = body.ends.iter().flat_map(|end| end.to_le_bytes());
+    write_array(&mut out, "offsets", "Int64", 1, ends);
+    write_array(&mut out, "types", "UInt8", 1, body.types.iter().copied());
     out.push_str("</Cells>\n</Piece>\n</UnstructuredGrid>\n</VTKFile>\n");
     out.into_bytes()
 }

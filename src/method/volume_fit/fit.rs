@@ -1,0 +1,341 @@
+//! A fit under way: the map, what it is fitted to, and the order of its stages.
+
+use super::objective::Parts;
+use super::settings::{Settings, Stage};
+use super::shell::{self, Shell};
+use super::surface_energy::Scale;
+use super::target::Target;
+use super::template::{Template, transform};
+use super::{COUNTERS, adaptivity, invalid, quality, subdivision, untangle, validity};
+use crate::energy::mapping::Density;
+use crate::fem::batches::{Batches, reference_volume, references_of_volume, unit_reference};
+use crate::fem::space::{Kind, Space};
+use crate::fem::volume_energy::VolumeEnergy;
+use crate::linalg::vector3::Columns;
+use crate::mesh::mixed::{MixedMesh, Topology};
+use crate::mesh::{self, bounding_box};
+use crate::method::{Failure, Outcome};
+use crate::optimize::{Observer, StopReason};
+use std::collections::BTreeMap;
+
+/// A fit under way, in units in which the target's box has the diagonal 1 and its middle the origin.
+pub(super) struct Fit<'a> {
+    pub(super) settings: &'a Settings,
+    pub(super) volume: MixedMesh,
+    pub(super) topology: Topology,
+    pub(super) target: Target,
+    pub(super) shell: Option<Shell>,
+    pub(super) references: Vec<Columns<f64>>,
+    pub(super) reference_volume: f64,
+    /// Edge of the references.
+    pub(super) size: f64,
+    pub(super) scale: Scale,
+    /// The target's units: length of 1 here, and the middle.
+    pub(super) unit: f64,
+    pub(super) middle: [f64; 3],
+    pub(super) space: Space,
+    pub(super) x: Vec<f64>,
+    pub(super) notices: Vec<String>,
+    pub(super) rows: Vec<[f64; 10]>,
+    pub(super) counters: BTreeMap<String, u64>,
+    pub(super) last: Parts,
+    pub(super) lambda: f64,
+    pub(super) increases: usize,
+    pub(super) stages: usize,
+    /// Quadrature points added a direction, after elements came out invalid between the points.
+    pub(super) extra_points: usize,
+    /// Those of the present map, once they are known.
+    pub(super) certificates: Option<validity::Certificates>,
+}
+
+impl<'a> Fit<'a> {
+    pub(super) fn new(
+        template: Template,
+        mut target: Target,
+        settings: &'a Settings,
+        mut notices: Vec<String>,
+    ) -> Result<Fit<'a>, Failure> {
+        notices.append(&mut target.notices);
+        let Template {
+            mesh: mut volume,
+            mut map,
+            mut shell,
+        } = template;
+        let points = if target.surface.points.is_empty() {
+            &target.sites
+        } else {
+            &target.surface.points
+        };
+        let [low, high] = bounding_box(points).ok_or_else(|| invalid("the target has no points".to_string()))?;
+        let unit = mesh::diagonal(points);
+        if !(unit > 0.0 && unit.is_finite()) {
+            return Err(invalid(format!(
+                "the target's box has the diagonal {unit}; it needs an extent"
+            )));
+        }
+        let middle: [f64; 3] = std::array::from_fn(|axis| 0.5 * (low[axis] + high[axis]));
+        let lists = [&mut target.surface.points, &mut target.clean.points, &mut target.sites];
+        for list in lists {
+            for point in list {
+                *point = std::array::from_fn(|axis| (point[axis] - middle[axis]) / unit);
+            }
+        }
+        transform(
+            &mut volume,
+            &mut map,
+            [1.0 / unit; 3],
+            middle.map(|coordinate| -coordinate / unit),
+        );
+        if let Some(shell) = &mut shell {
+            shell.distance /= unit;
+            for column in shell.references.iter_mut().flatten() {
+                *column = column.map(|coordinate| coordinate / unit);
+            }
+            shell.surface.points.copy_from_slice(&volume.points[..shell.base]);
+        }
+        target.place_sites();
+        let topology = volume.topology().map_err(invalid)?;
+        let template_surface = topology.boundary_triangles(&volume.points);
+        let own_volume = volume.volume();
+        if !(own_volume > 0.0) {
+            return Err(invalid(format!(
+                "the template has the volume {own_volume:e}; its elements are inside out or flat"
+            )));
+        }
+        check_target(&target, &mut notices)?;
+        let scale = Scale::of(&target, &template_surface, own_volume);
+        let (references, whole) = match &shell {
+            None => {
+                let shapes = volume.iter().map(|cell| cell.0);
+                (references_of_volume(shapes, scale.volume), scale.volume)
+            }
+            Some(shell) => {
+                let volumes = volume.iter().zip(&shell.references);
+                let sum = volumes
+                    .map(|((shape, _), reference)| reference_volume(shape, reference))
+                    .sum();
+                (shell.references.clone(), sum)
+            }
+        };
+        let unit_volume: f64 = volume
+            .iter()
+            .map(|(shape, _)| reference_volume(shape, &unit_reference(shape)))
+            .sum();
+        let first = settings.stages[0].order;
+        let (space, x) = match map {
+            None => {
+                let orders = vec![first; volume.cells()];
+                let space = Space::new(&volume, &topology, settings.basis, &orders).map_err(invalid)?;
+                let x = space.linear(&volume.points);
+                (space, x)
+            }
+            Some(map) if map.basis.name() == settings.basis.name() => {
+                let space = Space::new(&volume, &topology, settings.basis, &map.orders).map_err(invalid)?;
+                (space, map.x)
+            }
+            Some(map) => {
+                return Err(invalid(format!(
+                    "the template's coefficients belong to the basis {}, the job's is {}; set basis = \"{}\"",
+                    map.basis.name(),
+                    settings.basis.name(),
+                    map.basis.name()
+                )));
+            }
+        };
+        Ok(Fit {
+            settings,
+            size: (whole / unit_volume).cbrt(),
+            reference_volume: whole,
+            shell,
+            volume,
+            topology,
+            target,
+            references,
+            scale,
+            unit,
+            middle,
+            space,
+            x,
+            notices,
+            rows: Vec::new(),
+            counters: COUNTERS.iter().map(|(name, _)| (name.to_string(), 0)).collect(),
+            last: Parts::default(),
+            lambda: settings.stages[0].lambda,
+            increases: 0,
+            stages: 0,
+            extra_points: 0,
+            certificates: None,
+        })
+    }
+
+    pub(super) fn count(&mut self, name: &str, amount: u64) {
+        *self.counters.entry(name.to_string()).or_default() += amount;
+    }
+
+    pub(super) fn volume_energy(&self, space: &Space) -> Result<VolumeEnergy, Failure> {
+        self.volume_energy_of(space, Density::new(self.settings.energy))
+    }
+
+    pub(super) fn volume_energy_of(&self, space: &Space, density: Density) -> Result<VolumeEnergy, Failure> {
+        let quadrature = |kind: Kind| {
+            let points = self.settings.quadrature_points(kind.order) + self.extra_points;
+            self.settings.rule.cell(kind.shape, points)
+        };
+        let batches = Batches::new(space, &self.references, &quadrature).map_err(invalid)?;
+        VolumeEnergy::new(batches, density).map_err(invalid)
+    }
+
+    /// Intervals between samples along an edge of the boundary.
+    pub(super) fn intervals(&self, order: usize) -> usize {
+        let induced = if order == 1 { 1 } else { 2 * order - 2 };
+        self.settings.samples.unwrap_or_else(|| {
+            let faces = self.topology.boundary().count().max(1);
+            let sites = self.target.sites.len().max(self.target.surface.cells.len());
+            let even = (0.5 * sites as f64 / faces as f64).sqrt().ceil() as usize;
+            induced.max(even.clamp(2, 16))
+        })
+    }
+
+    pub(super) fn raise(&mut self, orders: &[usize]) -> Result<(), Failure> {
+        if orders == self.space.orders {
+            return Ok(());
+        }
+        let next = Space::new(&self.volume, &self.topology, self.settings.basis, orders).map_err(invalid)?;
+        self.x = self.space.transfer(&self.x, &next);
+        self.space = next;
+        Ok(())
+    }
+
+    pub(super) fn run(&mut self, observer: &mut dyn Observer) -> Result<Outcome, Failure> {
+        let start = self.volume_energy(&self.space)?;
+        let evaluation = start.value(&self.x);
+        let quality = quality::quality(&self.space, &self.references, &self.x)?;
+        let inverted_at_start = quality.least_determinant.iter().filter(|det| !(**det > 0.0)).count();
+        drop(start);
+        let mut stop = StopReason::Converged;
+        let mut reason = String::new();
+        if !evaluation.value.is_finite() && self.settings.untangle {
+            if let Some(interrupted) = untangle::untangle(self, observer)? {
+                return self.finish(
+                    interrupted,
+                    "stopped from outside while the template was untangled".to_string(),
+                    inverted_at_start,
+                    observer,
+                );
+            }
+        } else if !evaluation.value.is_finite() {
+            return Err(Failure {
+                kind: "invalid-start".to_string(),
+                reason: format!(
+                    "{inverted_at_start} elements of the template are inverted or flat (least determinant {:.3e}), where the \
+                     energy is infinite; repair the template, or change its recipe",
+                    evaluation.least_determinant
+                ),
+            });
+        }
+        if let Some(shell) = self.shell.clone() {
+            (stop, reason) = shell::run(self, &shell, observer)?;
+            return self.finish(stop, reason, inverted_at_start, observer);
+        }
+        if self.settings.levels > 0 {
+            (stop, reason) = subdivision::run(self, self.settings.levels, observer)?;
+            return self.finish(stop, reason, inverted_at_start, observer);
+        }
+        let stages = self.settings.stages.clone();
+        for stage in stages {
+            let orders: Vec<usize> = self.space.orders.iter().map(|&order| order.max(stage.order)).collect();
+            self.raise(&orders)?;
+            (stop, reason) = self.stage(&stage, observer)?;
+            if interrupted(stop) {
+                break;
+            }
+        }
+        if let Some(adaptive) = self.settings.adaptive
+            && !interrupted(stop)
+        {
+            for _ in 0..adaptive.steps {
+                let Some(orders) = adaptivity::raised(self, &adaptive)? else {
+                    break;
+                };
+                self.raise(&orders)?;
+                let stage = Stage {
+                    order: orders.iter().copied().max().unwrap_or(1),
+                    ..self.settings.stages[self.settings.stages.len() - 1]
+                };
+                (stop, reason) = self.stage(&stage, observer)?;
+                if interrupted(stop) {
+                    break;
+                }
+            }
+        }
+        for _ in 0..self.settings.repairs {
+            if interrupted(stop) {
+                break;
+            }
+            observer.phase("certify");
+            let certificates = validity::certify(&self.space, &self.references, &self.x, observer);
+            let failing = certificates
+                .verdicts
+                .iter()
+                .filter(|verdict| **verdict == validity::Judged::Fails)
+                .count();
+            if failing == 0 {
+                self.certificates = Some(certificates);
+                break;
+            }
+            self.extra_points += 3;
+            self.notices.push(format!(
+                "{failing} elements were invalid between quadrature points; gone on with {} more a direction",
+                self.extra_points
+            ));
+            if !self.volume_energy(&self.space)?.value(&self.x).value.is_finite()
+                && let Some(interrupted) = untangle::untangle(self, observer)?
+            {
+                (stop, reason) = (interrupted, "stopped from outside during a repair".to_string());
+                break;
+            }
+            let last = self.settings.stages[self.settings.stages.len() - 1];
+            (stop, reason) = self.stage(&last, observer)?;
+        }
+        self.finish(stop, reason, inverted_at_start, observer)
+    }
+}
+
+pub(super) fn interrupted(stop: StopReason) -> bool {
+    matches!(
+        stop,
+        StopReason::TimeLimit | StopReason::Cancelled | StopReason::NotFinite
+    )
+}
+
+/// Names what is wrong with a target surface; an inside-out one is turned, an open or damaged one only mentioned.
+fn check_target(target: &Target, notices: &mut Vec<String>) -> Result<(), Failure> {
+    if target.surface.cells.is_empty() {
+        notices.push(format!(
+            "the target is a cloud of {} points without normals",
+            target.sites.len()
+        ));
+        return Ok(());
+    }
+    if target.sites.is_empty() {
+        return Err(invalid("every triangle of the target has no area".to_string()));
+    }
+    let mut sides = BTreeMap::<[u32; 2], [usize; 2]>::new();
+    for cell in &target.surface.cells {
+        for place in 0..3 {
+            let (a, b) = (cell[place], cell[(place + 1) % 3]);
+            sides.entry([a.min(b), a.max(b)]).or_default()[usize::from(a > b)] += 1;
+        }
+    }
+    let open = sides.values().filter(|count| count[0] + count[1] == 1).count();
+    if open > 0 {
+        notices.push(format!(
+            "the target is open or a soup: {open} of its {} edges have one triangle; volume and length scale are the \
+             template's where its own make no sense",
+            sides.len()
+        ));
+    } else if target.surface.enclosed_volume() < 0.0 {
+        notices.push("the target is inside out; distances do not depend on it".to_string());
+    }
+    Ok(())
+}

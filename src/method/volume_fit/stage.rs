@@ -1,0 +1,240 @@
+//! One stage of a fit: L-BFGS with fixed orders and a fixed weight of the volume energy.
+
+use super::chart::Chart;
+use super::fit::Fit;
+use super::objective::{FitObjective, Parts};
+use super::preconditioner::{Model, Preconditioner};
+use super::settings::Stage;
+use super::surface_energy::SurfaceEnergy;
+use super::{invalid, untangle};
+use crate::fem::boundary::Boundary;
+use crate::method::Failure;
+use crate::optimize::lbfgs::Lbfgs;
+use crate::optimize::{Iterate, Observer, StopReason, Stopping};
+use std::cell::Cell;
+use std::rc::Rc;
+
+/// Share of the least determinant that a step must leave.
+const LEAST_SHARE: f64 = 0.2;
+
+/// Tells the world and remembers.
+struct Recorder<'a> {
+    observer: &'a mut dyn Observer,
+    rows: &'a mut Vec<[f64; 10]>,
+    latest: Rc<Cell<Parts>>,
+    floor: Rc<Cell<f64>>,
+    /// Accepted steps before this minimization, and whether its start is already recorded.
+    before: u64,
+    skip_start: bool,
+    stage: usize,
+    order: usize,
+    nodes: usize,
+    increases: &'a mut usize,
+    previous: f64,
+}
+
+impl Observer for Recorder<'_> {
+    fn phase(&mut self, name: &str) {
+        self.observer.phase(name);
+    }
+
+    fn iterate(&mut self, iterate: &Iterate) {
+        self.floor.set(LEAST_SHARE * self.latest.get().least_determinant);
+        if iterate.iteration == 0 && self.skip_start {
+            return;
+        }
+        let parts = self.latest.get();
+        if iterate.energy > self.previous {
+            *self.increases += 1;
+        }
+        self.previous = iterate.energy;
+        let shown = Iterate {
+            iteration: self.before + iterate.iteration,
+            ..*iterate
+        };
+        self.rows.push([
+            shown.iteration as f64,
+            self.stage as f64,
+            iterate.energy,
+            parts.surface,
+            parts.volume,
+            iterate.gradient_norm,
+            iterate.step,
+            parts.least_determinant,
+            self.order as f64,
+            self.nodes as f64,
+        ]);
+        self.observer.iterate(&shown);
+    }
+
+    fn stop(&self) -> Option<StopReason> {
+        self.observer.stop()
+    }
+}
+
+impl Fit<'_> {
+    /// Minimizes with the present orders, over the nodes.
+    pub(super) fn stage(
+        &mut self,
+        stage: &Stage,
+        observer: &mut dyn Observer,
+    ) -> Result<(StopReason, String), Failure> {
+        self.stage_over(stage, None, observer)
+    }
+
+    /// Minimizes with the present orders, over the nodes or over unknowns that stand for them.
+    pub(super) fn stage_over(
+        &mut self,
+        stage: &Stage,
+        mut chart: Option<(&Chart, &mut Vec<f64>)>,
+        observer: &mut dyn Observer,
+    ) -> Result<(StopReason, String), Failure> {
+        observer.phase(&format!("stage {}", self.stages));
+        let settings = self.settings;
+        self.lambda = stage.lambda;
+        let order = self.space.orders.iter().copied().max().unwrap_or(1);
+        let volume = self.volume_energy(&self.space)?;
+        if !volume.value(&self.x).value.is_finite()
+            && settings.untangle
+            && let Some(stop) = untangle::untangle(self, observer)?
+        {
+            // More points than in the stage before found an inversion.
+            return Ok((stop, "stopped from outside while elements were untangled".to_string()));
+        }
+        let boundary = Boundary::new(&self.volume, &self.topology, &self.space, self.intervals(order));
+        let mut samples = Vec::new();
+        boundary.positions(&self.x, &mut samples);
+        let fitted = self.shell.is_none() && (settings.terms.to_target || settings.terms.from_target);
+        let mut surface = if fitted {
+            let energy = SurfaceEnergy::new(
+                &samples,
+                &boundary.triangles,
+                &self.target,
+                settings.terms,
+                settings.anisotropy,
+                self.scale,
+            );
+            Some(energy.map_err(invalid)?)
+        } else {
+            None
+        };
+        let latest = Rc::new(Cell::new(Parts::default()));
+        let floor = Rc::new(Cell::new(f64::NEG_INFINITY));
+        let factor = surface.as_ref().map_or(0.0, SurfaceEnergy::factor);
+        let mut done = 0;
+        let mut previous = f64::INFINITY;
+        // The energy when a round last ended for its small change.
+        let mut settled = f64::INFINITY;
+        // The model of the Hessian is one of nodes.
+        let preconditioned = settings.preconditioned && chart.is_none();
+        let outcome = loop {
+            let preconditioner = if preconditioned {
+                boundary.positions(&self.x, &mut samples);
+                let model = Model {
+                    mesh: &self.volume,
+                    topology: &self.topology,
+                    space: &self.space,
+                    boundary: &boundary,
+                    samples: &samples,
+                    lambda: stage.lambda,
+                    size: self.size,
+                    volume: self.reference_volume,
+                    surface: factor,
+                    anisotropy: settings.anisotropy,
+                };
+                let made = Preconditioner::new(&model).map_err(invalid)?;
+                self.count("factorizations", 1);
+                Some(made)
+            } else {
+                None
+            };
+            let left = stage.iterations - done;
+            let round = if preconditioned {
+                left.min(settings.refresh)
+            } else {
+                left
+            };
+            let mut objective = FitObjective {
+                volume: &volume,
+                boundary: &boundary,
+                surface: surface.as_mut(),
+                lambda: stage.lambda,
+                preconditioner,
+                latest: latest.clone(),
+                floor: floor.clone(),
+                samples: Vec::new(),
+                forces: Vec::new(),
+                room: Vec::new(),
+                chart: chart.as_ref().map(|chart| chart.0),
+                nodes: Default::default(),
+            };
+            let lbfgs = Lbfgs {
+                stopping: Stopping {
+                    gradient_norm: settings.gradient_tolerance,
+                    relative_decrement: 0.0,
+                    relative_change: settings.change_tolerance,
+                    iterations: round,
+                    ..Stopping::default()
+                },
+                memory: settings.memory,
+                ..Lbfgs::default()
+            };
+            let mut recorder = Recorder {
+                observer,
+                latest: latest.clone(),
+                floor: floor.clone(),
+                before: self.counters["iterations"],
+                skip_start: done > 0,
+                stage: self.stages,
+                order,
+                nodes: self.space.nodes,
+                rows: &mut self.rows,
+                increases: &mut self.increases,
+                previous,
+            };
+            let start = match &mut chart {
+                Some((_, unknowns)) => std::mem::take(*unknowns),
+                None => std::mem::take(&mut self.x),
+            };
+            let solution = lbfgs.minimize(&mut objective, start, &mut recorder);
+            previous = solution.value;
+            match &mut chart {
+                Some((chart, unknowns)) => {
+                    chart.expand(&solution.x, &mut self.x);
+                    **unknowns = solution.x;
+                }
+                None => self.x = solution.x,
+            }
+            done += solution.counters.iterations;
+            self.count("iterations", solution.counters.iterations);
+            self.count("evaluations", solution.counters.evaluations);
+            // A step cut short by the barrier changes little as well: only when a fresh start finds nothing either has the
+            // stage converged.
+            let by_change =
+                solution.stop == StopReason::Converged && solution.gradient_norm >= settings.gradient_tolerance;
+            let again = by_change
+                && solution.counters.iterations > 0
+                && settled - solution.value > 5.0 * settings.change_tolerance * solution.value.abs();
+            if again {
+                settled = solution.value;
+            }
+            let more = (solution.stop == StopReason::StepLimit || again) && done < stage.iterations;
+            if !more {
+                // The parts at the accepted point, not at the last one tried.
+                let mut gradient = vec![0.0; self.x.len()];
+                use crate::optimize::Objective as _;
+                objective.chart = None;
+                objective.gradient(&self.x, &mut gradient);
+                self.last = latest.get();
+                let reason = if solution.stop == StopReason::StepLimit {
+                    format!("{} iterations of a stage were not enough", stage.iterations)
+                } else {
+                    solution.reason
+                };
+                break (solution.stop, reason);
+            }
+        };
+        self.stages += 1;
+        Ok(outcome)
+    }
+}

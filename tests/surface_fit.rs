@@ -180,7 +180,8 @@ fn clouds_are_fitted() {
     assert!(outcome.metrics["hausdorff"] < 1.5, "{:?}", outcome.metrics);
     for (text, expected) in [
         ("1 2 3\n1 2 x\n", "cloud.xyz:2"),
-        ("7\n", "no cloud"),
+        ("7\n", "no points"),
+        ("1 2 3\n1 2 3\n", "no cloud"),
         ("", "no points"),
     ] {
         let error = fit(cloud(text.to_string()), template(), json!({})).unwrap_err();

@@ -189,7 +189,8 @@ fn the_stabilised_system_converges_where_others_do_not() {
     let stabilised = json!({ "equation": "triharmonic", "condition": "curve" });
     let region = json!({ "equation": "triharmonic", "condition": "region" });
     let rate = |family: &str, settings: &Value| {
-        let (coarse, fine) = (error(family, 16, settings.clone()), error(family, 32, settings.clone()));
+        // Far enough apart for the chance of a random mesh to count little.
+        let (coarse, fine) = (error(family, 12, settings.clone()), error(family, 48, settings.clone()));
         (coarse.1 / fine.1).ln() / (coarse.0 / fine.0).ln()
     };
     for family in ["regular", "centroid-split", "minimum-angle-30"] {

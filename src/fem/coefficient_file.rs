@@ -48,9 +48,9 @@ pub fn sniff(bytes: &[u8]) -> bool {
 
 /// 64-bit FNV-1a.
 fn checksum(bytes: &[u8]) -> u64 {
-    bytes
-        .iter()
-        .fold(0xcbf2_9ce4_8422_2325, |hash, &byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
+    bytes.iter().fold(0xcbf2_9ce4_8422_2325, |hash, &byte| {
+        (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
+    })
 }
 
 /// The file of a map.
@@ -111,10 +111,15 @@ pub fn read(bytes: &[u8]) -> Result<Volume, String> {
     let cells = [count("hexahedra ")?, count("prisms ")?, count("tetrahedra ")?];
     let nodes = count("nodes ")?;
     let text = line("checksum ")?;
-    let stated = u64::from_str_radix(text, 16).map_err(|_| format!("the checksum {text:?} is no hexadecimal number"))?;
+    let stated =
+        u64::from_str_radix(text, 16).map_err(|_| format!("the checksum {text:?} is no hexadecimal number"))?;
     line("data")?;
     let all: usize = cells.iter().sum();
-    let corners: usize = cells.iter().zip(Shape::ALL).map(|(count, shape)| count * shape.corners()).sum();
+    let corners: usize = cells
+        .iter()
+        .zip(Shape::ALL)
+        .map(|(count, shape)| count * shape.corners())
+        .sum();
     let expected = 4 * corners + all + 24 * nodes;
     if rest.len() != expected {
         return Err(format!(
@@ -142,7 +147,10 @@ pub fn read(bytes: &[u8]) -> Result<Volume, String> {
         return Err(format!("{vertices} vertices cannot be among {nodes} nodes"));
     }
     let mut mesh = MixedMesh {
-        points: x[..3 * vertices].chunks_exact(3).map(|row| [row[0], row[1], row[2]]).collect(),
+        points: x[..3 * vertices]
+            .chunks_exact(3)
+            .map(|row| [row[0], row[1], row[2]])
+            .collect(),
         ..MixedMesh::default()
     };
     let mut cell = 0;
@@ -151,7 +159,9 @@ pub fn read(bytes: &[u8]) -> Result<Volume, String> {
             let corners: Vec<u32> = indices.by_ref().take(shape.corners()).collect();
             let beyond = corners.iter().find(|&&corner| corner as usize >= vertices);
             if let Some(corner) = beyond {
-                return Err(format!("cell {cell} has the corner {corner}, there are {vertices} vertices"));
+                return Err(format!(
+                    "cell {cell} has the corner {corner}, there are {vertices} vertices"
+                ));
             }
             mesh.push(shape, &corners);
             if !(1..=HIGHEST_ORDER).contains(&orders[cell]) {

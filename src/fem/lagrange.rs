@@ -64,7 +64,9 @@ pub fn lagrange(
         let m = order(cell.kind);
         kinds.entry(cell.kind).or_insert_with(|| {
             let nodes = Rule::Trapezoid.cell(cell.kind.shape, m + 1).nodes();
-            let coordinates = nodes.into_iter().map(|(point, _)| point.map(|u| (u * m as f64).round() as usize));
+            let coordinates = nodes
+                .into_iter()
+                .map(|(point, _)| point.map(|u| (u * m as f64).round() as usize));
             coordinates.collect()
         });
         finds.entry((cell.kind.shape, m)).or_insert_with(|| {
@@ -130,8 +132,15 @@ fn name(shape: Shape, corners: &[u32], m: usize, [i, j, k]: [usize; 3]) -> Vec<(
         },
     };
     let weights = shape.canonical().iter().map(|&corner| weight(corner) as u32);
-    let mut name: Vec<(u32, u32)> = corners.iter().copied().zip(weights).filter(|entry| entry.1 > 0).collect();
-    let common = name.iter().fold(0, |divisor, entry| greatest_common_divisor(divisor, entry.1));
+    let mut name: Vec<(u32, u32)> = corners
+        .iter()
+        .copied()
+        .zip(weights)
+        .filter(|entry| entry.1 > 0)
+        .collect();
+    let common = name
+        .iter()
+        .fold(0, |divisor, entry| greatest_common_divisor(divisor, entry.1));
     for entry in &mut name {
         entry.1 /= common.max(1);
     }

@@ -4,10 +4,10 @@
 //! element, with the gradient g of the whole energy and the diagonal d of the model Hessian, predicts how much the energy
 //! would fall. A function shared by several elements counts in equal parts.
 
-use super::settings::Adaptive;
-use super::surface_energy::SurfaceEnergy;
 use super::fit::Fit;
 use super::invalid;
+use super::settings::Adaptive;
+use super::surface_energy::SurfaceEnergy;
 use crate::fem::boundary::Boundary;
 use crate::fem::space::Space;
 use crate::method::Failure;

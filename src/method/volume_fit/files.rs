@@ -14,7 +14,10 @@ pub static FILES: &[(&str, &str)] = &[
         "lagrange",
         "`curved.vtu`: VTK's Lagrange cells of the elements' own order, with the fields of the picture",
     ),
-    ("gmsh", "`curved.msh`: Gmsh's complete elements of the elements' own order, 9 at most"),
+    (
+        "gmsh",
+        "`curved.msh`: Gmsh's complete elements of the elements' own order, 9 at most",
+    ),
     (
         "coefficients",
         "`coefficients`: basis, orders and coefficients to the last bit; a template for further jobs",
@@ -46,8 +49,10 @@ impl Fit<'_> {
             match name {
                 "lagrange" => {
                     let form = self.form(x, vtu::curved::HIGHEST_ORDER, "curved.vtu")?;
-                    let views: Vec<(&str, usize, &[f64])> =
-                        fields.iter().map(|(name, values)| (*name, 1, values.as_slice())).collect();
+                    let views: Vec<(&str, usize, &[f64])> = fields
+                        .iter()
+                        .map(|(name, values)| (*name, 1, values.as_slice()))
+                        .collect();
                     files.insert("curved.vtu".to_string(), vtu::curved::write_curved(&form.mesh, &views));
                 }
                 "gmsh" => {

@@ -1,11 +1,11 @@
 //! A fit under way: the map, what it is fitted to, and the order of its stages.
 
-use super::shell::{self, Shell};
+use super::objective::Parts;
 use super::settings::{Settings, Stage};
+use super::shell::{self, Shell};
 use super::surface_energy::Scale;
 use super::target::Target;
 use super::template::{Template, transform};
-use super::objective::Parts;
 use super::{COUNTERS, adaptivity, invalid, quality, subdivision, untangle, validity};
 use crate::energy::mapping::Density;
 use crate::fem::batches::{Batches, reference_volume, references_of_volume, unit_reference};
@@ -17,7 +17,6 @@ use crate::mesh::{self, bounding_box};
 use crate::method::{Failure, Outcome};
 use crate::optimize::{Observer, StopReason};
 use std::collections::BTreeMap;
-
 
 /// A fit under way, in units in which the target's box has the diagonal 1 and its middle the origin.
 pub(super) struct Fit<'a> {
@@ -75,11 +74,7 @@ impl<'a> Fit<'a> {
             )));
         }
         let middle: [f64; 3] = std::array::from_fn(|axis| 0.5 * (low[axis] + high[axis]));
-        let lists = [
-            &mut target.surface.points,
-            &mut target.clean.points,
-            &mut target.sites,
-        ];
+        let lists = [&mut target.surface.points, &mut target.clean.points, &mut target.sites];
         for list in lists {
             for point in list {
                 *point = std::array::from_fn(|axis| (point[axis] - middle[axis]) / unit);
@@ -116,7 +111,9 @@ impl<'a> Fit<'a> {
             }
             Some(shell) => {
                 let volumes = volume.iter().zip(&shell.references);
-                let sum = volumes.map(|((shape, _), reference)| reference_volume(shape, reference)).sum();
+                let sum = volumes
+                    .map(|((shape, _), reference)| reference_volume(shape, reference))
+                    .sum();
                 (shell.references.clone(), sum)
             }
         };

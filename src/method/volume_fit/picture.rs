@@ -15,7 +15,6 @@ use std::collections::BTreeMap;
 /// Cells of the picture at most, where elements may be cut coarser.
 const MOST_CELLS: usize = 60_000;
 
-
 /// The volume as a VTU file of linear cells, every element cut evenly.
 pub fn picture(
     space: &Space,

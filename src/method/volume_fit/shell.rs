@@ -70,7 +70,8 @@ pub fn grow(surface: &TriangleMesh, distance: f64, layers: usize, side: &str) ->
             for layer in 1..=layers {
                 for vertex in 0..vertices {
                     let height = sign * share * lengths[vertex] * layer as f64 / layers as f64;
-                    mesh.points.push(add_scaled(surface.points[vertex], normals[vertex], height));
+                    mesh.points
+                        .push(add_scaled(surface.points[vertex], normals[vertex], height));
                 }
             }
             let name = |vertex: u32, layer: usize| match layer {
@@ -79,7 +80,11 @@ pub fn grow(surface: &TriangleMesh, distance: f64, layers: usize, side: &str) ->
             };
             for layer in 1..=layers {
                 for &cell in &surface.cells {
-                    let (below, above) = if sign > 0.0 { (layer - 1, layer) } else { (layer, layer - 1) };
+                    let (below, above) = if sign > 0.0 {
+                        (layer - 1, layer)
+                    } else {
+                        (layer, layer - 1)
+                    };
                     let [a, b, c] = cell;
                     let corners = [
                         name(a, below),
@@ -187,7 +192,11 @@ fn reference([a, b, c]: [[f64; 3]; 3], height: f64) -> Columns<f64> {
     let (u, v) = (subtract(b, a), subtract(c, a));
     let base = length(u);
     let along = dot(u, v) / base;
-    [[base, 0.0, 0.0], [along, length(cross(u, v)) / base, 0.0], [0.0, 0.0, height]]
+    [
+        [base, 0.0, 0.0],
+        [along, length(cross(u, v)) / base, 0.0],
+        [0.0, 0.0, height],
+    ]
 }
 
 /// Prisms with a determinant at a corner that is not positive.

@@ -1,11 +1,11 @@
 //! One stage of a fit: L-BFGS with fixed orders and a fixed weight of the volume energy.
 
 use super::chart::Chart;
+use super::fit::Fit;
 use super::objective::{FitObjective, Parts};
 use super::preconditioner::{Model, Preconditioner};
 use super::settings::Stage;
 use super::surface_energy::SurfaceEnergy;
-use super::fit::Fit;
 use super::{invalid, untangle};
 use crate::fem::boundary::Boundary;
 use crate::method::Failure;
@@ -74,7 +74,11 @@ impl Observer for Recorder<'_> {
 
 impl Fit<'_> {
     /// Minimizes with the present orders, over the nodes.
-    pub(super) fn stage(&mut self, stage: &Stage, observer: &mut dyn Observer) -> Result<(StopReason, String), Failure> {
+    pub(super) fn stage(
+        &mut self,
+        stage: &Stage,
+        observer: &mut dyn Observer,
+    ) -> Result<(StopReason, String), Failure> {
         self.stage_over(stage, None, observer)
     }
 

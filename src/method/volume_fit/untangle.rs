@@ -3,10 +3,10 @@
 //!
 //! Success is judged at the quadrature points. Not guaranteed: success.
 
-use super::objective::{FitObjective, Parts};
-use super::surface_energy::SurfaceEnergy;
 use super::fit::Fit;
 use super::invalid;
+use super::objective::{FitObjective, Parts};
+use super::surface_energy::SurfaceEnergy;
 use crate::energy::mapping::Density;
 use crate::energy::untangling::Untangling;
 use crate::fem::boundary::Boundary;

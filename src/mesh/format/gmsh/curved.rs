@@ -54,17 +54,7 @@ pub fn order_of_points(shape: Shape, order: usize) -> Vec<[usize; 3]> {
             peeled_cell(shape, order, &edges, faces)
         }
         Shape::Prism => {
-            let edges = [
-                [0, 1],
-                [0, 2],
-                [0, 3],
-                [1, 2],
-                [1, 4],
-                [2, 5],
-                [3, 4],
-                [3, 5],
-                [4, 5],
-            ];
+            let edges = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 4], [2, 5], [3, 4], [3, 5], [4, 5]];
             let faces: &[&[usize]] = &[&[0, 2, 1], &[3, 4, 5], &[0, 1, 4, 3], &[0, 3, 5, 2], &[1, 2, 5, 4]];
             let mut points = corner_points(shape, order);
             points.extend(edges.iter().flat_map(|&edge| edge_points(shape, order, edge)));
@@ -102,7 +92,10 @@ pub fn write_curved(mesh: &CurvedMesh) -> Result<Vec<u8>, String> {
         let _ = write!(out, " {value:?}");
     }
     let points = mesh.points.len();
-    let _ = write!(out, " 0 0\n$EndEntities\n$Nodes\n1 {points} 1 {points}\n3 1 0 {points}\n");
+    let _ = write!(
+        out,
+        " 0 0\n$EndEntities\n$Nodes\n1 {points} 1 {points}\n3 1 0 {points}\n"
+    );
     for row in 1..=points {
         let _ = writeln!(out, "{row}");
     }

@@ -22,17 +22,7 @@ fn code(shape: Shape) -> u8 {
 pub fn order_of_points(shape: Shape, order: usize) -> Vec<[usize; 3]> {
     let edges: &[[usize; 2]] = match shape {
         Shape::Tetrahedron => &[[0, 1], [1, 2], [2, 0], [0, 3], [1, 3], [2, 3]],
-        Shape::Prism => &[
-            [0, 1],
-            [1, 2],
-            [2, 0],
-            [3, 4],
-            [4, 5],
-            [5, 3],
-            [0, 3],
-            [1, 4],
-            [2, 5],
-        ],
+        Shape::Prism => &[[0, 1], [1, 2], [2, 0], [3, 4], [4, 5], [5, 3], [0, 3], [1, 4], [2, 5]],
         Shape::Hexahedron => shape.edges(),
     };
     if shape == Shape::Tetrahedron {

@@ -2,13 +2,17 @@
 
 use serde_json::{Value, json};
 use vargeo::fem::bernstein_hexahedron::{self as bernstein, ControlPoints, Verdict};
+use vargeo::linalg::processor::Processor;
 use vargeo::linalg::vector3::{dot, subtract};
+use vargeo::mesh::format::{self, vtu};
 use vargeo::mesh::generate::surface::{generate_surface, surfaces};
-use vargeo::mesh::quadrilateral::{Connectivity, QuadrilateralMesh};
+use vargeo::mesh::quadrilateral::{Connectivity, QuadrilateralMesh, Triangles};
+use vargeo::method::g1_surface::evaluation::{Derivatives, Evaluated, Places, evaluate};
 use vargeo::method::g1_surface::network::{Network, natural};
 use vargeo::method::g1_surface::patch::{Operator, Patch, Reference, Solve, fit};
 use vargeo::method::g1_surface::{
-    G1Surface, balance, continuity, edge_normals, enclosure, hermite, laplace_beltrami, least_squares, patch, surface,
+    G1Surface, balance, continuity, control_net, edge_normals, enclosure, hermite, laplace_beltrami, least_squares,
+    patch, surface,
 };
 use vargeo::method::model::{LoadedModel, Part};
 use vargeo::method::{Failure, Inputs, Method, Outcome};
@@ -61,6 +65,7 @@ fn small(name: &str) -> Value {
         "torus" => json!({ "around": 8, "across": 6, "jitter": 0.15 }),
         "poles" => json!({ "valence": 8, "cells": 2 }),
         "saddle" => json!({ "cells": 5, "jitter": 0.2 }),
+        "cube" | "ridge" => json!({ "cells": 2 }),
         _ => Value::Null,
     }
 }
@@ -163,7 +168,8 @@ fn tangents_that_meet_the_enclosure_condition_equal_the_stored_ones() {
 
 #[test]
 fn normals_agree_along_every_edge_of_every_generated_surface() {
-    for generator in surfaces() {
+    // Those of the cylinder with one normal a vertex are too far from its quads; see the tests of creases.
+    for generator in surfaces().iter().filter(|generator| generator.name != "cylinder") {
         let name = generator.name;
         let mesh = generate_surface(name, &small(name)).expect("valid").mesh;
         let mut network = network_of(&mesh);
@@ -316,6 +322,126 @@ fn plane_data_give_plane_patches_and_derivatives_fit() {
             .sum();
         assert!((value - here.position[axis]).abs() < 1e-14);
     }
+}
+
+#[test]
+fn eight_points_at_a_time_give_the_same_bits() {
+    let mesh = generate_surface("ellipsoid", &small("ellipsoid")).expect("valid").mesh;
+    let points: Vec<[f64; 2]> = (0..21)
+        .map(|index| [f64::from(index) / 20.0, f64::from(index * 7 % 21) / 20.0])
+        .collect();
+    let places = Places::new(&points);
+    for patch in patches(&mut network_of(&mesh)).iter().take(4) {
+        for processor in Processor::available() {
+            let mut evaluated = Evaluated::default();
+            evaluate(processor, patch, &places, Derivatives::Second, &mut evaluated);
+            assert_eq!(evaluated.len(), points.len());
+            for (jet, point) in evaluated.jets().zip(&points) {
+                let [u, v] = point.map(surface::Place::new);
+                assert_eq!(jet, surface::evaluate(patch, &u, &v), "{processor:?}");
+            }
+            evaluate(processor, patch, &places, Derivatives::First, &mut evaluated);
+            let [u, v] = points[13].map(surface::Place::new);
+            let jet = surface::first_derivatives(patch, &u, &v);
+            assert_eq!(evaluated.first(13), [jet.position, jet.u, jet.v]);
+        }
+    }
+}
+
+#[test]
+fn folded_patches_are_repaired() {
+    // Slopes found vertex by vertex grow where curves are shallow and symmetric: patches of the saddle turn over.
+    let saddle = || generated("saddle", json!({ "cells": 8, "jitter": 0.2 }));
+    let left = json!({ "edge_normals": "local", "repair": false, "tessellation": 1 });
+    let folded = run(saddle(), left).expect("a surface");
+    assert!(folded.metrics["folded"] > 0.0 && folded.metrics["normal_slope"] > 10.0);
+    let repaired = run(saddle(), json!({ "edge_normals": "local", "tessellation": 1 })).expect("a surface");
+    assert!(repaired.counters["repairs"] > 0);
+    assert_eq!(repaired.metrics["folded"], 0.0);
+    assert!(
+        repaired.metrics["angle_max"] < 1e-10
+            && repaired.metrics["normal_slope"] < 0.5 * folded.metrics["normal_slope"]
+    );
+    assert!(repaired.metrics["distance_max"] < 0.1 * folded.metrics["distance_max"]);
+    assert!(repaired.notices.is_empty(), "{:?}", repaired.notices);
+}
+
+#[test]
+fn exports_hold_the_surface() {
+    let settings = json!({ "export": ["control-points", "obj", "bezier"], "tessellation": 2, "hexahedra": "outward" });
+    let outcome = run(generated("sphere", json!({ "cells": 2 })), settings).expect("a surface");
+    let names: Vec<&str> = outcome.files.keys().map(String::as_str).collect();
+    assert_eq!(
+        names,
+        [
+            "bezier-hexahedra.vtu",
+            "bezier.vtu",
+            "control-points.txt",
+            "tessellation.obj"
+        ]
+    );
+    let text = String::from_utf8(outcome.files["control-points.txt"].clone()).expect("text");
+    let nets = control_net::parse(&text).expect("what was written");
+    let mesh = generate_surface("sphere", &json!({ "cells": 2 })).expect("valid").mesh;
+    let wanted: Vec<Patch> = patches(&mut network_of(&mesh))
+        .iter()
+        .map(surface::control_points)
+        .collect();
+    assert_eq!(nets, wanted);
+    assert!(control_net::parse(&text.replace("24", "23")).is_err());
+    assert!(control_net::parse(text.trim_end_matches('\n').rsplit_once('\n').expect("lines").0).is_err());
+    let content = format::read("tessellation.obj", &outcome.files["tessellation.obj"]).expect("a mesh");
+    let (read, _) = QuadrilateralMesh::from_content(&content, Triangles::Refuse).expect("quads");
+    assert_eq!((read.quads.len(), read.points.len()), (24 * 4, 24 * 4 + 2));
+    for (point, normal) in read.points.iter().zip(read.normals.as_ref().expect("normals")) {
+        assert!(length(subtract(*point, normal.map(|component| component / length(*normal)))) < 0.02);
+    }
+}
+
+#[test]
+fn orders_of_bezier_points_visit_every_point_once() {
+    for order in 1..5 {
+        let mut quadrilateral = vtu::quadrilateral_order(order);
+        quadrilateral.sort_unstable();
+        quadrilateral.dedup();
+        assert_eq!(quadrilateral.len(), (order + 1).pow(2));
+        let mut hexahedron = vtu::hexahedron_order(order);
+        hexahedron.sort_unstable();
+        hexahedron.dedup();
+        assert_eq!(hexahedron.len(), (order + 1).pow(3));
+    }
+}
+
+#[test]
+fn quads_by_dual_contouring_lie_on_their_surface() {
+    let with = |mesh: Part, surface: Part, settings: Value| {
+        let mut model = LoadedModel::default();
+        model.parts.insert("mesh".to_string(), mesh);
+        model.parts.insert("surface".to_string(), surface);
+        let inputs = Inputs {
+            settings: &settings,
+            model,
+        };
+        G1Surface.run(inputs, &mut Silent)
+    };
+    let contour = || generated("dual-contouring", json!({ "cells": 10, "smoothing": 10 }));
+    let torus = generated("torus", json!({ "around": 48, "across": 24 }));
+    let outcome = with(contour(), torus, json!({ "tessellation": 1 })).expect("a surface");
+    let metric = |name: &str| outcome.metrics[name];
+    // A torus: V - E + F = 0, and every quad has four half edges.
+    assert_eq!(metric("vertices") - metric("edges") + metric("quads"), 0.0);
+    assert_eq!(metric("boundary_edges"), 0.0);
+    assert!(metric("angle_max") < 1e-8, "{}", metric("angle_max"));
+    assert_eq!(metric("folded"), 0.0);
+    assert!(metric("distance_max") < 0.05, "{}", metric("distance_max"));
+    let open = with(contour(), generated("saddle", json!({})), json!({})).expect_err("open");
+    assert!(open.reason.contains("the surface is open"), "{}", open.reason);
+    let missing = run(contour(), json!({})).expect_err("no surface");
+    assert!(
+        missing.reason.contains("needs the model's `surface`"),
+        "{}",
+        missing.reason
+    );
 }
 
 #[test]

@@ -12,6 +12,7 @@ mod energies;
 mod experiment_files;
 mod floors;
 mod formats;
+mod g1_creases;
 mod g1_surface;
 mod gate;
 mod generators;

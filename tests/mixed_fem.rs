@@ -71,7 +71,9 @@ fn scheme(name: &str) -> Value {
         "curve1" => ("curve", "first-order-ring"),
         _ => ("curve", "second-order-ring"),
     };
-    json!({ "equation": equation, "condition": condition, "curve": curve, "mass": mass })
+    json!({
+        "equation": equation, "condition": condition, "curve": curve, "mass": mass, "relaxation": "quadratic",
+    })
 }
 
 #[test]
@@ -177,8 +179,12 @@ fn the_stabilised_system_converges_where_others_do_not() {
         (coarse.1 / fine.1).ln() / (coarse.0 / fine.0).ln()
     };
     for family in ["regular", "centroid-split", "minimum-angle-30"] {
-        let found = rate(family, &stabilised);
-        assert!((1.85..2.5).contains(&found), "{family}: rate {found}");
+        for relaxation in ["linear", "quadratic"] {
+            let mut settings = stabilised.clone();
+            settings["relaxation"] = json!(relaxation);
+            let found = rate(family, &settings);
+            assert!((1.85..2.5).contains(&found), "{family}, {relaxation}: rate {found}");
+        }
     }
     // 2.00 and 0.16 by the independent program.
     assert!((rate("regular", &region) - 2.0).abs() < 0.05);
@@ -186,22 +192,55 @@ fn the_stabilised_system_converges_where_others_do_not() {
 }
 
 #[test]
-fn symmetric_pivots_hold_for_the_mixed_systems_of_larger_meshes() {
+fn symmetric_factorizations_hold_for_the_mixed_systems_of_larger_meshes() {
     for (family, condition) in [
         ("regular", "region"),
         ("regular", "curve"),
         ("minimum-angle-30", "curve"),
+        ("minimum-angle-1", "region"),
     ] {
         for equation in ["biharmonic", "triharmonic"] {
-            let settings = json!({
-                "equation": equation, "condition": condition, "system": "mixed", "solver": "lblt", "compare": true,
-            });
-            let outcome = run(generated("square", json!({ "family": family, "cells": 32 })), settings)
-                .unwrap_or_else(|failure| panic!("{family}, {condition}, {equation}: {}", failure.reason));
-            let difference = outcome.metrics["difference"];
-            assert!(difference < 1e-6, "{family}, {condition}, {equation}: {difference:e}");
+            for solver in ["ldlt", "lblt"] {
+                let settings = json!({
+                    "equation": equation, "condition": condition, "system": "mixed", "solver": solver, "compare": true,
+                });
+                let outcome = run(generated("square", json!({ "family": family, "cells": 32 })), settings)
+                    .unwrap_or_else(|failure| panic!("{family}, {condition}, {equation}: {}", failure.reason));
+                let difference = outcome.metrics["difference"];
+                assert!(
+                    difference < 1e-6,
+                    "{family}, {condition}, {equation}, {solver}: {difference:e}"
+                );
+            }
         }
     }
+}
+
+#[test]
+fn known_signs_are_the_default_and_pivoting_answers_where_they_fail() {
+    let solve = |settings: Value| {
+        run(
+            generated("square", json!({ "family": "regular", "cells": 8 })),
+            settings,
+        )
+    };
+    for curve in ["stabilised", "first-order-ring", "second-order-ring"] {
+        let settings = json!({ "equation": "triharmonic", "condition": "curve", "curve": curve });
+        let outcome = solve(settings).expect("a solution");
+        assert!(outcome.reason.contains("ldlt"), "{curve}: {}", outcome.reason);
+        assert_eq!(outcome.counters["fallbacks"], 0);
+    }
+    // No diagonal for w on the boundary: without pivots there is no factorization.
+    let settings = json!({
+        "equation": "triharmonic", "condition": "curve", "curve": "unstabilised", "system": "mixed",
+        "on_singular": "continue", "solver": "ldlt",
+    });
+    let outcome = solve(settings).expect("an outcome");
+    assert!(
+        outcome.stop == "singular" && outcome.reason.contains("sign"),
+        "{}",
+        outcome.reason
+    );
 }
 
 #[test]

@@ -152,6 +152,50 @@ fn blocks_agree_with_dense_algebra() {
 }
 
 #[test]
+fn pivots_of_known_signs_agree_with_dense_algebra() {
+    // Saddle points with a vertex's two unknowns together: a negative diagonal and a positive definite coupling.
+    let (points, cells) = grid(6);
+    let edges: Vec<[u32; 2]> = cells
+        .iter()
+        .flat_map(|c| [[c[2], c[3]], [c[0], c[1]], [c[1], c[2]]])
+        .collect();
+    let graph = Graph::of_cells(points.len(), &edges, Some);
+    let pattern = BlockPattern::<2>::of_graph(&graph, &nested_dissection(&graph, &points));
+    let mut values = vec![0.0; pattern.values_len()];
+    let mut expected = nalgebra::DMatrix::zeros(pattern.dimension(), pattern.dimension());
+    let amounts = noise(graph.neighbours.len(), 5);
+    for vertex in 0..graph.len() {
+        let mut couple = |other: usize, block: [f64; 4]| {
+            let (start, exchanged) = pattern.block(vertex, other).expect("an edge");
+            let [a, b, c, d] = block;
+            values[start..start + 4].copy_from_slice(&if exchanged { [a, c, b, d] } else { block });
+            for (index, value) in [a, b, c, d].into_iter().enumerate() {
+                expected[(2 * vertex + index / 2, 2 * other + index % 2)] = value;
+            }
+        };
+        for &other in graph.neighbours(vertex as u32) {
+            couple(other as usize, [0.0, -1.0, -1.0, 0.0]);
+        }
+        let degree = graph.degree(vertex as u32) as f64;
+        couple(vertex, [-1.5 - amounts[vertex], degree + 0.1, degree + 0.1, 0.0]);
+    }
+    let right = noise(pattern.dimension(), 8);
+    let mut factor = BlockCholesky::with_signs(pattern, [-1.0, 1.0]);
+    factor.factorize(&values, 0.0).expect("signs as expected");
+    let mut x = right.clone();
+    factor.solve_in_place(&mut x);
+    let dense = expected
+        .lu()
+        .solve(&nalgebra::DVector::from_column_slice(&right))
+        .expect("regular");
+    for (a, b) in x.iter().zip(dense.iter()) {
+        assert!((a - b).abs() < 1e-10 * dense.amax(), "{a} {b}");
+    }
+    let wrong: Vec<f64> = values.iter().map(|value| -value).collect();
+    assert!(factor.factorize(&wrong, 0.0).is_err(), "the wrong signs are told");
+}
+
+#[test]
 fn a_matrix_that_is_not_positive_is_named_and_recovered_from() {
     let (points, cells) = grid(4);
     let pattern = BlockPattern::<3>::new(&points, &cells, &inside(&points)).unwrap();

@@ -72,8 +72,15 @@ impl SurfaceOperators {
     /// # Errors
     /// The first triangle whose area is below 1e-12 of its longest edge squared.
     pub fn new(mesh: &TriangleMesh, selected: &[bool]) -> Result<Self, Degenerate> {
+        Self::on_graph(mesh, &Graph::of_cells(mesh.points.len(), &mesh.cells, Some), selected)
+    }
+
+    /// The same with the graph of the mesh's edges, where it is at hand.
+    ///
+    /// # Errors
+    /// As [`SurfaceOperators::new`].
+    pub fn on_graph(mesh: &TriangleMesh, graph: &Graph, selected: &[bool]) -> Result<Self, Degenerate> {
         let vertices = mesh.points.len();
-        let graph = Graph::of_cells(vertices, &mesh.cells, Some);
         let mut pattern = Pattern {
             offsets: Vec::with_capacity(vertices + 1),
             columns: Vec::with_capacity(graph.neighbours.len() + vertices),

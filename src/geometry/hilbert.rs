@@ -2,6 +2,10 @@
 //!
 //! Positions on the curve follow Skilling, "Programming the Hilbert curve" (2004), with 21 bits an axis.
 
+use rayon::prelude::*;
+
+/// From this number of points on, threads share the work.
+const MANY: usize = 4096;
 /// Bits of a coordinate on the curve.
 const BITS: u32 = 21;
 
@@ -56,13 +60,20 @@ pub fn order(points: &[[f64; 3]], keys: &mut Vec<(u64, u32)>, order: &mut Vec<u3
     } else {
         0.0
     };
-    keys.clear();
-    keys.extend(points.iter().enumerate().map(|(index, point)| {
+    let key = |(index, point): (usize, &[f64; 3])| {
         // The conversion saturates, and the mask keeps what is not finite within the grid.
         let cell = std::array::from_fn(|axis| ((point[axis] - low[axis]) * scale) as u32 & ((1 << BITS) - 1));
         (position(cell), index as u32)
-    }));
-    keys.sort_unstable();
+    };
+    // Keys differ by their indices, so that every way of sorting gives the same order.
+    if points.len() >= MANY && rayon::current_num_threads() > 1 {
+        points.par_iter().enumerate().map(key).collect_into_vec(keys);
+        keys.par_sort_unstable();
+    } else {
+        keys.clear();
+        keys.extend(points.iter().enumerate().map(key));
+        keys.sort_unstable();
+    }
     order.clear();
     order.extend(keys.iter().map(|&(_, index)| index));
 }

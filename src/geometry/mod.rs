@@ -7,3 +7,4 @@ pub mod restricted_voronoi;
 pub mod squared_distance;
 pub mod centroidal_voronoi;
 pub mod ray;
+pub mod dual_contouring;

@@ -8,6 +8,10 @@
 use super::hilbert;
 use crate::linalg::lanes::{Lanes, Vector, WIDTH};
 
+use rayon::prelude::*;
+
+/// From this number on, threads share the work of building.
+const MANY: usize = 4096;
 /// Enough for the pending children of eight a level and 2^32 points.
 const STACK: usize = 128;
 /// No twin.
@@ -80,8 +84,7 @@ impl PointTree {
         self.finite = within_reach(points);
         hilbert::order(points, &mut self.keys, &mut self.order);
         self.remove_twins();
-        self.leaves.clear();
-        for group in self.order.chunks(WIDTH) {
+        let leaf = |group: &[u32]| {
             let mut leaf = Leaf {
                 points: [FAR; 3],
                 indices: [NONE; WIDTH],
@@ -92,7 +95,13 @@ impl PointTree {
                     leaf.points[axis].0[lane] = points[index as usize][axis];
                 }
             }
-            self.leaves.push(leaf);
+            leaf
+        };
+        if points.len() >= MANY && rayon::current_num_threads() > 1 {
+            (self.order.par_chunks(WIDTH).map(leaf)).collect_into_vec(&mut self.leaves);
+        } else {
+            self.leaves.clear();
+            self.leaves.extend(self.order.chunks(WIDTH).map(leaf));
         }
         let mut depth = 0;
         // Boxes to make on this level, and things in the last of them.
@@ -112,21 +121,29 @@ impl PointTree {
                     high: [FAR; 3],
                 },
             );
-            for child in 0..count {
-                let boxes = &mut level[child / WIDTH];
-                let present = (things - child * WIDTH).min(WIDTH);
-                for axis in 0..3 {
-                    let (low, high) = match below.last() {
-                        None => {
-                            let leaf = &self.leaves[child];
-                            (&leaf.points[axis], &leaf.points[axis])
-                        }
-                        Some(below) => (&below[child].low[axis], &below[child].high[axis]),
-                    };
-                    boxes.low[axis].0[child % WIDTH] = low.0[..present].iter().copied().fold(f64::INFINITY, f64::min);
-                    boxes.high[axis].0[child % WIDTH] =
-                        high.0[..present].iter().copied().fold(f64::NEG_INFINITY, f64::max);
+            let leaves = &self.leaves;
+            let fill = |(node, boxes): (usize, &mut Boxes)| {
+                for child in node * WIDTH..count.min((node + 1) * WIDTH) {
+                    let present = (things - child * WIDTH).min(WIDTH);
+                    for axis in 0..3 {
+                        let (low, high) = match below.last() {
+                            None => {
+                                let leaf = &leaves[child];
+                                (&leaf.points[axis], &leaf.points[axis])
+                            }
+                            Some(below) => (&below[child].low[axis], &below[child].high[axis]),
+                        };
+                        boxes.low[axis].0[child % WIDTH] =
+                            low.0[..present].iter().copied().fold(f64::INFINITY, f64::min);
+                        boxes.high[axis].0[child % WIDTH] =
+                            high.0[..present].iter().copied().fold(f64::NEG_INFINITY, f64::max);
+                    }
                 }
+            };
+            if count >= MANY && rayon::current_num_threads() > 1 {
+                level.par_iter_mut().enumerate().for_each(fill);
+            } else {
+                level.iter_mut().enumerate().for_each(fill);
             }
             depth += 1;
             things = count;
@@ -262,6 +279,55 @@ impl PointTree {
         Some((best.1, best.0))
     }
 
+    /// Writes the points that are at most the square root of `bound` away from a box. False, with nothing useful written,
+    /// when there are more than `most`.
+    #[inline(always)]
+    pub(crate) fn gather<V: Vector>(
+        &self,
+        low: [f64; 3],
+        high: [f64; 3],
+        bound: f64,
+        most: usize,
+        some: &mut SomePoints,
+    ) -> bool {
+        some.clear();
+        if self.order.is_empty() {
+            return true;
+        }
+        let mut stack = [(0u32, 0u32); STACK];
+        let mut height = 1;
+        stack[0] = (self.levels.len() as u32, 0);
+        let limit = V::constant(bound);
+        while height > 0 {
+            height -= 1;
+            let (level, node) = stack[height];
+            let boxes = &self.levels[level as usize - 1][node as usize];
+            let mut near = !V::bits(limit.less(gap::<V>(&boxes.low, &boxes.high, low, high)));
+            while near != 0 {
+                let child = node * WIDTH as u32 + near.trailing_zeros();
+                near &= near - 1;
+                if level > 1 {
+                    stack[height] = (level - 1, child);
+                    height += 1;
+                    continue;
+                }
+                let leaf = &self.leaves[child as usize];
+                let mut inside = !V::bits(limit.less(gap::<V>(&leaf.points, &leaf.points, low, high)));
+                while inside != 0 {
+                    let lane = inside.trailing_zeros() as usize;
+                    inside &= inside - 1;
+                    if leaf.indices[lane] != NONE {
+                        some.push(leaf, lane);
+                    }
+                }
+                if some.count > most {
+                    return false;
+                }
+            }
+        }
+        true
+    }
+
     /// Appends, in no particular order, the points that for every row `bound` of `bounds` are less than the square root of
     /// `bound[k]` away from `centres[k]` for some `k`.
     #[inline(always)]
@@ -304,6 +370,92 @@ impl PointTree {
             }
         }
     }
+}
+
+/// A few points of a tree, eight side by side.
+#[derive(Debug, Default)]
+pub(crate) struct SomePoints {
+    leaves: Vec<Leaf>,
+    count: usize,
+}
+
+impl SomePoints {
+    fn clear(&mut self) {
+        self.leaves.clear();
+        self.count = 0;
+    }
+
+    #[inline(always)]
+    fn push(&mut self, from: &Leaf, lane: usize) {
+        let place = self.count % WIDTH;
+        if place == 0 {
+            self.leaves.push(Leaf {
+                points: [FAR; 3],
+                indices: [NONE; WIDTH],
+            });
+        }
+        if let Some(leaf) = self.leaves.last_mut() {
+            leaf.indices[place] = from.indices[lane];
+            for axis in 0..3 {
+                leaf.points[axis].0[place] = from.points[axis].0[lane];
+            }
+        }
+        self.count += 1;
+    }
+
+    /// [`PointTree::contenders`] among these points.
+    #[inline(always)]
+    pub(crate) fn contenders<V: Vector>(&self, centres: &[[f64; 3]; 3], bounds: &[[f64; 3]], found: &mut Vec<u32>) {
+        for leaf in &self.leaves {
+            let squares = [
+                PointTree::squares::<V>(leaf, centres[0]),
+                PointTree::squares::<V>(leaf, centres[1]),
+                PointTree::squares::<V>(leaf, centres[2]),
+            ];
+            let mut inside = contend(&squares, bounds);
+            while inside != 0 {
+                found.push(leaf.indices[inside.trailing_zeros() as usize]);
+                inside &= inside - 1;
+            }
+        }
+    }
+
+    /// The nearer of `best`, a squared distance and an index, and these points; the smaller index among equally near ones.
+    #[inline(always)]
+    pub(crate) fn nearest<V: Vector>(&self, x: [f64; 3], mut best: (f64, u32)) -> (f64, u32) {
+        let mut lanes = Lanes::ZERO;
+        for leaf in &self.leaves {
+            let squares = PointTree::squares::<V>(leaf, x);
+            // Not farther than the best.
+            let mut near = !V::bits(V::constant(best.0).less(squares));
+            if near == 0 {
+                continue;
+            }
+            squares.store(&mut lanes);
+            while near != 0 {
+                let lane = near.trailing_zeros() as usize;
+                near &= near - 1;
+                if (lanes.0[lane], leaf.indices[lane]) < best {
+                    best = (lanes.0[lane], leaf.indices[lane]);
+                }
+            }
+        }
+        best
+    }
+}
+
+/// Squared distances of eight boxes to one; infinite for an absent box.
+#[inline(always)]
+fn gap<V: Vector>(lows: &[Lanes; 3], highs: &[Lanes; 3], low: [f64; 3], high: [f64; 3]) -> V {
+    let zero = V::constant(0.0);
+    let mut sum = zero;
+    for axis in 0..3 {
+        let below = V::load(&lows[axis]) - V::constant(high[axis]);
+        let above = V::constant(low[axis]) - V::load(&highs[axis]);
+        let outside = below.max(above).max(zero);
+        sum = sum + outside * outside;
+    }
+    sum
 }
 
 /// The lanes that for every row of bounds are below one of its entries.

@@ -18,7 +18,7 @@
 
 use super::point_tree::PointTree;
 use super::restricted_voronoi::{Candidate, Compatibility, Cut, Error, RestrictedVoronoi};
-use crate::linalg::vector3::{add, dot, times};
+use crate::linalg::vector3::{add, cross, dot, times};
 use crate::mesh::subtract;
 
 /// Weights the distance along normals.
@@ -142,8 +142,10 @@ struct Work {
     normals: bool,
     /// Edges move and the integrand jumps across them.
     edges: bool,
-    /// Sums by site are wanted at all.
+    /// Sums by site are wanted at all,
     sums: bool,
+    /// and areas or moments among them.
+    cells: bool,
 }
 
 impl SquaredDistance {
@@ -204,17 +206,29 @@ impl SquaredDistance {
                 && ((wanted.sites.is_some() && options.derivative == Derivative::Complete)
                     || wanted.surface.is_some()
                     || wanted.normals.is_some()),
+            cells: wanted.areas.is_some() || wanted.moments.is_some(),
             sums: wanted.sites.is_some()
                 || wanted.normals.is_some()
                 || wanted.areas.is_some()
                 || wanted.moments.is_some(),
         };
+        // Whole triangles of the plain distance have a short formula.
+        let plain = !anisotropic && options.compatibility.is_none() && !(work.surface || work.normals);
+        let positions = sites.points();
         self.chunks.iter_mut().for_each(Chunk::clear);
-        let done = self
-            .diagram
-            .sweep(points, sites, options.compatibility, &mut self.chunks, |chunk, cut| {
-                piece(chunk, cut, options, work)
-            });
+        let done = self.diagram.sweep(
+            points,
+            sites,
+            options.compatibility,
+            &mut self.chunks,
+            |chunk, cut| piece(chunk, cut, options, work),
+            |chunk, corners, site| {
+                plain && {
+                    triangle(chunk, corners, site, positions[site as usize], work);
+                    true
+                }
+            },
+        );
         if !done {
             return if self.diagram.cells().is_empty() && sites.is_finite() {
                 0.0
@@ -297,6 +311,29 @@ impl Normal {
     }
 }
 
+/// Adds a triangle that lies in one cell, for the plain distance and without derivatives by the surface.
+#[inline]
+fn triangle(chunk: &mut Chunk, corners: &[[f64; 3]; 3], site: u32, position: [f64; 3], work: Work) {
+    let [a, b, c] = corners.map(|corner| subtract(corner, position));
+    let across = cross(subtract(b, a), subtract(c, a));
+    let area = 0.5 * dot(across, across).sqrt();
+    if !(area > 0.0) {
+        return;
+    }
+    let sum = add(add(a, b), c);
+    chunk.value += area / 12.0 * (dot(a, a) + dot(b, b) + dot(c, c) + dot(sum, sum));
+    if work.sums {
+        let sums = chunk.sums(site);
+        if work.sites {
+            accumulate(sums, GRADIENT, times(sum, -2.0 / 3.0 * area));
+        }
+        if work.cells {
+            accumulate(sums, MOMENT, add(times(sum, area / 3.0), times(position, area)));
+            sums[AREA] += area;
+        }
+    }
+}
+
 /// Adds one piece to its chunk. All vectors are in the triangle's frame until they are stored.
 fn piece(chunk: &mut Chunk, cut: &Cut<'_>, options: &Options<'_>, work: Work) {
     let frame = cut.frame;
@@ -355,9 +392,11 @@ fn piece(chunk: &mut Chunk, cut: &Cut<'_>, options: &Options<'_>, work: Work) {
             }
             accumulate(sums, NORMAL, frame.space(gradient));
         }
-        let centre = frame.space(add([first.u * area, first.v * area, 0.0], moment));
-        accumulate(sums, MOMENT, add(centre, times(frame.origin, area)));
-        sums[AREA] += area;
+        if work.cells {
+            let centre = frame.space(add([first.u * area, first.v * area, 0.0], moment));
+            accumulate(sums, MOMENT, add(centre, times(frame.origin, area)));
+            sums[AREA] += area;
+        }
     }
     let slopes = if work.surface {
         frame.barycentric_gradients()

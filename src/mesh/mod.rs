@@ -8,6 +8,7 @@ pub mod quality;
 pub mod split;
 pub mod check;
 pub mod quadrilateral;
+pub mod crease;
 pub mod mixed;
 pub mod curved;
 pub mod summary;

@@ -19,7 +19,10 @@ pub(crate) type Mark = i32;
 /// No site is known that is lower at the vertex than the owner.
 const UNKNOWN: i32 = -2;
 /// The owner is lowest at the vertex.
-const SETTLED: i32 = -1;
+pub(super) const SETTLED: i32 = -1;
+
+/// The number of every lane.
+const LANE: Lanes = Lanes([0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]);
 
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Corner {
@@ -94,6 +97,45 @@ impl Heights {
         }
         let [a, b, c] = self.get(i);
         self.lowest::<V>(u, v).0 >= a * u + b * v + c - tolerance
+    }
+
+    /// Walking from `from` along `direction`, where another function becomes as low as `own` first: the length walked, in
+    /// units of `direction`, and the function. Infinite when none does. `besides` is left out.
+    #[inline(always)]
+    pub(super) fn rise<V: Vector>(&self, own: u32, besides: u32, from: [f64; 2], direction: [f64; 2]) -> (f64, u32) {
+        let [a, b, c] = self.get(own as usize);
+        let (a, b, c) = (V::constant(a), V::constant(b), V::constant(c));
+        let (u, v) = (V::constant(from[0]), V::constant(from[1]));
+        let (du, dv) = (V::constant(direction[0]), V::constant(direction[1]));
+        let zero = V::constant(0.0);
+        let never = V::constant(f64::INFINITY);
+        let mut best = never;
+        let mut place = zero;
+        let mut index = 0.0;
+        for (number, group) in self.groups.iter().enumerate() {
+            let (p, q) = (V::load(&group[0]) - a, V::load(&group[1]) - b);
+            let above = p * u + q * v + (V::load(&group[2]) - c);
+            let fall = zero - (p * du + q * dv);
+            let mut approaches = zero.less(fall);
+            if number == besides as usize / WIDTH {
+                let lanes = V::load(&LANE);
+                let lane = V::constant((besides as usize % WIDTH) as f64);
+                approaches = approaches & (lanes.less(lane) | lane.less(lanes));
+            }
+            let length = V::select(approaches, above / fall, never);
+            let sooner = length.less(best);
+            best = V::select(sooner, length, best);
+            place = V::select(sooner, V::constant(index), place);
+            index += 1.0;
+        }
+        let soonest = best.smallest();
+        let lane = (!V::bits(V::constant(soonest).less(best))).trailing_zeros() as usize % WIDTH;
+        if self.groups.len() == 1 {
+            return (soonest, lane as u32);
+        }
+        let mut places = Lanes::ZERO;
+        place.store(&mut places);
+        (soonest, (places.0[lane] as usize * WIDTH + lane) as u32)
     }
 
     /// The smallest value at a point, and the first function that takes it.

@@ -14,6 +14,7 @@
 //! diagram on every triangle.
 
 mod clip;
+mod envelope;
 mod exact;
 mod frame;
 mod subdivide;
@@ -22,19 +23,25 @@ pub(crate) use clip::{Candidate, Corner};
 pub(crate) use frame::Frame;
 
 use crate::geometry::hilbert;
-use crate::geometry::point_tree::{PointTree, within_reach};
+use crate::geometry::point_tree::{PointTree, SomePoints, within_reach};
 use crate::linalg::lanes::Vector;
 use crate::linalg::processor::{Kernel, Processor};
 use crate::mesh::{dot, subtract};
 use clip::{Clipper, Heights, Polygons};
+use envelope::Envelope;
 use exact::ExactClipper;
 use rayon::prelude::*;
+use std::cell::RefCell;
 use std::fmt;
 use std::sync::Mutex;
 use subdivide::Subdivision;
 
 /// Triangles, or vertices, treated together by one thread.
 const CHUNK: usize = 512;
+/// Most triangles, or vertices, whose sites are looked up together,
+const BLOCK: usize = 16;
+/// and most sites that are kept at hand for them.
+const AT_HAND: usize = 96;
 /// Triangles with more candidates are subdivided first.
 const MANY: usize = 48;
 
@@ -109,6 +116,8 @@ pub(crate) struct Cut<'a> {
 /// Memory for one triangle at a time.
 #[derive(Debug, Default)]
 struct Scratch {
+    reaches: Vec<Reach>,
+    some: SomePoints,
     found: Vec<u32>,
     candidates: Vec<Candidate>,
     heights: Heights,
@@ -116,9 +125,118 @@ struct Scratch {
     rivals: Vec<u32>,
     polygons: Polygons,
     clipper: Clipper,
+    envelope: Envelope,
     exact: ExactClipper,
     duals: Vec<[f64; 3]>,
     subdivision: Subdivision,
+}
+
+/// The sites nearest to a triangle's vertices, and how near another one must come to own a part of it.
+#[derive(Clone, Copy, Debug)]
+struct Reach {
+    corners: [[f64; 3]; 3],
+    near: [u32; 3],
+    /// The one of `near` that is nearest to all three vertices together.
+    reference: u32,
+    /// One row a different site of `near`: no site owns a part that is not closer to some vertex than its entry there.
+    rows: [[f64; 3]; 3],
+    count: usize,
+}
+
+impl Reach {
+    #[inline(always)]
+    fn new(corners: [[f64; 3]; 3], near: [u32; 3], positions: &[[f64; 3]], offset: impl Fn(u32) -> f64) -> Reach {
+        let mut bounds = [[0.0; 3]; 3];
+        for k in 0..3 {
+            bounds[k] = if k > 0 && near[k] == near[k - 1] {
+                bounds[k - 1]
+            } else {
+                Reach::row(&corners, near[k], positions, &offset)
+            };
+        }
+        let sum = |k: usize| bounds[k][0] + bounds[k][1] + bounds[k][2];
+        let mut best = 0;
+        for k in 1..3 {
+            if near[k] != near[best] && (sum(k), near[k]) < (sum(best), near[best]) {
+                best = k;
+            }
+        }
+        let reference = near[best];
+        let mut rows = [bounds[best]; 3];
+        let mut count = 1;
+        for k in 0..3 {
+            if near[k] != reference && !(k == 2 && near[1] == near[2]) {
+                rows[count.min(2)] = bounds[k];
+                count += 1;
+            }
+        }
+        Reach {
+            corners,
+            near,
+            reference,
+            rows,
+            count: count.min(3),
+        }
+    }
+
+    /// A little more than the squared distances of the corners to a site, for their rounding.
+    #[inline(always)]
+    fn row(corners: &[[f64; 3]; 3], site: u32, positions: &[[f64; 3]], offset: &impl Fn(u32) -> f64) -> [f64; 3] {
+        let position = positions[site as usize];
+        let offset = offset(site);
+        corners.map(|corner| {
+            let difference = subtract(corner, position);
+            (dot(difference, difference) + offset) * (1.0 + 1e-12)
+        })
+    }
+
+    /// The whole triangle belongs to one site.
+    fn is_whole(&self) -> bool {
+        self.count == 1
+    }
+
+    /// No site farther from the triangle's corners than the root of this owns a part.
+    #[inline(always)]
+    fn radius(&self) -> f64 {
+        self.rows[..self.count].iter().fold(f64::INFINITY, |least, row| {
+            least.min(row.iter().fold(0.0, |most: f64, &bound| most.max(bound)))
+        })
+    }
+}
+
+/// A box that grows around points.
+#[derive(Clone, Copy, Debug)]
+struct Around {
+    low: [f64; 3],
+    high: [f64; 3],
+}
+
+impl Around {
+    const NOTHING: Around = Around {
+        low: [f64::INFINITY; 3],
+        high: [f64::NEG_INFINITY; 3],
+    };
+
+    #[inline(always)]
+    fn add(&mut self, point: [f64; 3]) {
+        for axis in 0..3 {
+            self.low[axis] = self.low[axis].min(point[axis]);
+            self.high[axis] = self.high[axis].max(point[axis]);
+        }
+    }
+}
+
+/// How many triangles, or vertices, have their sites looked up together: fewer where sites are dense.
+fn block(things: usize, sites: usize) -> usize {
+    if 4 * sites < things {
+        BLOCK
+    } else if sites < things {
+        BLOCK / 2
+    } else if sites < 4 * things {
+        BLOCK / 4
+    } else {
+        1
+    }
 }
 
 /// The connectivity of a surface, and memory for diagrams restricted to it. Made once, used for any number of positions of
@@ -230,10 +348,12 @@ impl RestrictedVoronoi {
                     area: 0.5 * doubled,
                 });
             },
+            whole: |_: &[[f64; 3]; 3], _| false,
         });
     }
 
-    /// Calls `visit` for every piece, in parallel: chunk `k` of the triangles with `states[k]`.
+    /// Calls `visit` for every piece, in parallel: chunk `k` of the triangles with `states[k]`. A triangle that lies in the
+    /// cell of one site is first shown to `whole`, as its corners and the site, and not to `visit` if that returns true.
     pub(crate) fn sweep<State: Send>(
         &mut self,
         points: &[[f64; 3]],
@@ -241,6 +361,7 @@ impl RestrictedVoronoi {
         compatibility: Option<Compatibility<'_>>,
         states: &mut [State],
         visit: impl Fn(&mut State, &Cut<'_>) + Sync,
+        whole: impl Fn(&mut State, &[[f64; 3]; 3], u32) -> bool + Sync,
     ) -> bool {
         if !self.find_nearest(points, sites) {
             return false;
@@ -248,6 +369,7 @@ impl RestrictedVoronoi {
         let this = &*self;
         let processor = Processor::detect();
         this.order.par_chunks(CHUNK).zip(states).for_each(|(triangles, state)| {
+            let state = RefCell::new(state);
             let mut scratch = this.take();
             processor.run(Sweep {
                 diagram: this,
@@ -256,7 +378,8 @@ impl RestrictedVoronoi {
                 sites,
                 compatibility,
                 scratch: &mut scratch,
-                visit: |cut: &Cut<'_>| visit(state, cut),
+                visit: |cut: &Cut<'_>| visit(&mut **state.borrow_mut(), cut),
+                whole: |corners: &[[f64; 3]; 3], site| whole(&mut **state.borrow_mut(), corners, site),
             });
             this.give(scratch);
         });
@@ -284,40 +407,71 @@ impl RestrictedVoronoi {
             return false;
         }
         let processor = Processor::detect();
-        self.vertex_order
+        // Only where a site is nearest to several vertices.
+        let block = match block(points.len(), sites.points().len()) {
+            block if block == BLOCK => block,
+            _ => 1,
+        };
+        let mut ordered = std::mem::take(&mut self.ordered);
+        let this = &*self;
+        this.vertex_order
             .par_chunks(CHUNK)
-            .zip(self.ordered.par_chunks_mut(CHUNK))
+            .zip(ordered.par_chunks_mut(CHUNK))
             .for_each(|(vertices, found)| {
+                let mut scratch = this.take();
                 processor.run(FindNearest {
                     vertices,
+                    block,
                     points,
                     sites,
+                    scratch: &mut scratch,
                     found,
                 });
+                this.give(scratch);
             });
+        self.ordered = ordered;
         for (&vertex, &found) in self.vertex_order.iter().zip(&self.ordered) {
             self.nearest[vertex as usize] = found;
         }
         true
     }
 
-    /// Cuts one triangle.
+    /// The sites around one triangle.
+    #[inline(always)]
+    fn reach(&self, triangle: u32, points: &[[f64; 3]], sites: &PointTree) -> Reach {
+        let cell = self.cells[triangle as usize].map(|vertex| vertex as usize);
+        let corners = cell.map(|vertex| points[vertex]);
+        let near = cell.map(|vertex| self.nearest[vertex]);
+        if near[0] == near[1] && near[0] == near[2] {
+            // Cells are convex. Rows are needed where normals matter only, and are then made anew.
+            return Reach {
+                corners,
+                near,
+                reference: near[0],
+                rows: [[0.0; 3]; 3],
+                count: 1,
+            };
+        }
+        Reach::new(corners, near, sites.points(), |_| 0.0)
+    }
+
+    /// Cuts one triangle, whose sites are `at_hand` if so it says.
     #[inline(always)]
     fn cut<V: Vector>(
         &self,
         triangle: u32,
-        points: &[[f64; 3]],
+        reach: &Reach,
+        at_hand: bool,
         sites: &PointTree,
         compatibility: Option<Compatibility<'_>>,
         scratch: &mut Scratch,
         visit: &mut impl FnMut(&Cut<'_>),
     ) {
-        let cell = self.cells[triangle as usize];
-        let [a, b, c] = cell.map(|vertex| vertex as usize);
-        let corners = [points[a], points[b], points[c]];
+        let corners = reach.corners;
         let Some(frame) = Frame::new(corners) else { return };
-        let near = [self.nearest[a], self.nearest[b], self.nearest[c]];
         let Scratch {
+            reaches: _,
+            some,
             found,
             candidates,
             heights,
@@ -325,6 +479,7 @@ impl RestrictedVoronoi {
             rivals,
             polygons,
             clipper,
+            envelope,
             exact,
             duals,
             subdivision,
@@ -336,40 +491,19 @@ impl RestrictedVoronoi {
                 compatibility.weight * (1.0 - dot(normal, frame.normal)).max(0.0)
             })
         };
-        // A little more than the squared distances, for their rounding.
-        let mut bounds = [[0.0; 3]; 3];
-        for k in 0..3 {
-            if k > 0 && near[k] == near[k - 1] {
-                bounds[k] = bounds[k - 1];
-                continue;
-            }
-            let offset = offset(near[k]);
-            for corner in 0..3 {
-                let difference = subtract(corners[corner], positions[near[k] as usize]);
-                bounds[k][corner] = (dot(difference, difference) + offset) * (1.0 + 1e-12);
-            }
-        }
-        // The reference: of the sites nearest to the vertices the one with the smallest sum over the vertices.
-        let sum = |k: usize| bounds[k][0] + bounds[k][1] + bounds[k][2];
-        let mut best = 0;
-        for k in 1..3 {
-            if near[k] != near[best] && (sum(k), near[k]) < (sum(best), near[best]) {
-                best = k;
-            }
-        }
-        let reference = near[best];
+        let reach = match compatibility {
+            None => *reach,
+            Some(_) => Reach::new(corners, reach.near, positions, offset),
+        };
+        let reference = reach.reference;
         found.clear();
-        if compatibility.is_some() || near != [reference; 3] {
-            // No site owns a part that is not closer to some vertex than each of these.
-            let mut distinct = [bounds[best]; 3];
-            let mut count = 1;
-            for k in 0..3 {
-                if near[k] != reference && !(k == 2 && near[1] == near[2]) {
-                    distinct[count.min(2)] = bounds[k];
-                    count += 1;
-                }
+        if compatibility.is_some() || !reach.is_whole() {
+            let rows = &reach.rows[..reach.count];
+            if at_hand {
+                some.contenders::<V>(&corners, rows, found);
+            } else {
+                sites.contenders::<V>(&corners, rows, found);
             }
-            sites.contenders::<V>(&corners, &distinct[..count.min(3)], found);
             if compatibility.is_some() {
                 if !found.contains(&reference) {
                     found.push(reference);
@@ -428,7 +562,15 @@ impl RestrictedVoronoi {
             // Differences of height functions below this are rounding.
             let tolerance = 32.0 * f64::EPSILON * scale;
             let few = candidates.len() <= MANY;
-            if few {
+            // Polygons that overlap or leave gaps betray themselves by their areas.
+            let allowed = 1e-10 * frame.area + 1e-14 * frame.diameter * frame.diameter;
+            let whole = |polygons: &Polygons| (polygons.area - frame.area).abs() <= allowed;
+            let walked = few && envelope.cells::<V>(&frame, heights, polygons) && whole(polygons);
+            if !walked {
+                polygons.clear();
+            }
+            if walked {
+            } else if few {
                 let start = Clipper::corners::<V>(&frame, heights);
                 for owner in 0..candidates.len() {
                     let polygon = clipper.cell::<V>(&start, heights, owner, tolerance);
@@ -454,9 +596,7 @@ impl RestrictedVoronoi {
                     }
                 }
             }
-            // Polygons that overlap or leave gaps betray themselves by their areas.
-            let allowed = 1e-10 * frame.area + 1e-14 * frame.diameter * frame.diameter;
-            if !((polygons.area - frame.area).abs() <= allowed) {
+            if !whole(polygons) {
                 polygons.clear();
                 // Of equal functions the first one owns: the one with the smallest index.
                 candidates.sort_unstable_by_key(|candidate| candidate.site);
@@ -505,7 +645,7 @@ fn size(x: [f64; 3]) -> f64 {
 }
 
 /// Cuts a chunk of triangles in vector registers.
-struct Sweep<'a, Visit> {
+struct Sweep<'a, Visit, Whole> {
     diagram: &'a RestrictedVoronoi,
     triangles: &'a [u32],
     points: &'a [[f64; 3]],
@@ -513,43 +653,124 @@ struct Sweep<'a, Visit> {
     compatibility: Option<Compatibility<'a>>,
     scratch: &'a mut Scratch,
     visit: Visit,
+    /// Takes a triangle that lies in the cell of one site, if it likes.
+    whole: Whole,
 }
 
-impl<Visit: FnMut(&Cut<'_>)> Kernel for Sweep<'_, Visit> {
+impl<Visit: FnMut(&Cut<'_>), Whole: FnMut(&[[f64; 3]; 3], u32) -> bool> Kernel for Sweep<'_, Visit, Whole> {
     #[inline(always)]
     fn run<V: Vector>(mut self) {
-        for &triangle in self.triangles {
-            self.diagram.cut::<V>(
-                triangle,
-                self.points,
-                self.sites,
-                self.compatibility,
-                self.scratch,
-                &mut self.visit,
-            );
+        let diagram = self.diagram;
+        let block = block(diagram.cells.len(), self.sites.points().len());
+        let mut reaches = std::mem::take(&mut self.scratch.reaches);
+        for triangles in self.triangles.chunks(block) {
+            reaches.clear();
+            let mut around = Around::NOTHING;
+            let (mut bound, mut count) = (0.0f64, 0);
+            for &triangle in triangles {
+                let reach = diagram.reach(triangle, self.points, self.sites);
+                if self.compatibility.is_none() && !reach.is_whole() {
+                    reach.corners.into_iter().for_each(|corner| around.add(corner));
+                    bound = bound.max(reach.radius());
+                    count += 1;
+                }
+                reaches.push(reach);
+            }
+            let at_hand =
+                count > 1 && (self.sites).gather::<V>(around.low, around.high, bound, AT_HAND, &mut self.scratch.some);
+            for (&triangle, reach) in triangles.iter().zip(&reaches) {
+                if self.compatibility.is_none() && reach.is_whole() && (self.whole)(&reach.corners, reach.reference) {
+                    continue;
+                }
+                diagram.cut::<V>(
+                    triangle,
+                    reach,
+                    at_hand,
+                    self.sites,
+                    self.compatibility,
+                    self.scratch,
+                    &mut self.visit,
+                );
+            }
         }
+        self.scratch.reaches = reaches;
     }
 }
 
 /// Finds the sites nearest to a chunk of vertices.
 struct FindNearest<'a> {
     vertices: &'a [u32],
+    block: usize,
     points: &'a [[f64; 3]],
     sites: &'a PointTree,
+    scratch: &'a mut Scratch,
+    /// Holds the sites that were nearest the last time, which are good guesses.
     found: &'a mut [u32],
+}
+
+impl FindNearest<'_> {
+    // No closure: it would not inherit the instruction set.
+    #[inline(always)]
+    fn nearest<V: Vector>(&self, vertex: u32, hint: Option<u32>, before: u32) -> u32 {
+        let x = self.points[vertex as usize];
+        let sites = self.sites.points();
+        let hint = match (hint, sites.get(before as usize)) {
+            (Some(hint), Some(&old)) => {
+                let (here, there) = (subtract(sites[hint as usize], x), subtract(old, x));
+                Some(if dot(there, there) < dot(here, here) {
+                    before
+                } else {
+                    hint
+                })
+            }
+            (None, Some(_)) => Some(before),
+            (hint, None) => hint,
+        };
+        // There are sites, so there is a nearest one.
+        self.sites.nearest_in::<V>(x, hint).map_or(0, |(site, _)| site)
+    }
 }
 
 impl Kernel for FindNearest<'_> {
     #[inline(always)]
-    fn run<V: Vector>(self) {
+    fn run<V: Vector>(mut self) {
+        let mut some = std::mem::take(&mut self.scratch.some);
+        let found = std::mem::take(&mut self.found);
         let mut hint = None;
-        for (&vertex, found) in self.vertices.iter().zip(self.found) {
-            // There are sites, so there is a nearest one.
-            *found = self
+        for (vertices, found) in self.vertices.chunks(self.block).zip(found.chunks_mut(self.block)) {
+            let first = self.nearest::<V>(vertices[0], hint, found[0]);
+            hint = Some(first);
+            found[0] = first;
+            if vertices.len() == 1 {
+                continue;
+            }
+            let position = self.sites.points()[first as usize];
+            let square = |vertex: u32| {
+                let difference = subtract(position, self.points[vertex as usize]);
+                dot(difference, difference)
+            };
+            let mut around = Around::NOTHING;
+            let mut bound = 0.0f64;
+            for &vertex in &vertices[1..] {
+                around.add(self.points[vertex as usize]);
+                bound = bound.max(square(vertex));
+            }
+            if self
                 .sites
-                .nearest_in::<V>(self.points[vertex as usize], hint)
-                .map_or(0, |(site, _)| site);
-            hint = Some(*found);
+                .gather::<V>(around.low, around.high, bound, AT_HAND, &mut some)
+            {
+                for (&vertex, found) in vertices.iter().zip(found).skip(1) {
+                    *found = some
+                        .nearest::<V>(self.points[vertex as usize], (square(vertex), first))
+                        .1;
+                }
+            } else {
+                for (&vertex, found) in vertices.iter().zip(found).skip(1) {
+                    *found = self.nearest::<V>(vertex, hint, *found);
+                    hint = Some(*found);
+                }
+            }
         }
+        self.scratch.some = some;
     }
 }

@@ -1,18 +1,22 @@
-//! Numeric multifrontal Cholesky factorization and the triangular solves.
+//! Numeric multifrontal factorization `L J L^T` and the triangular solves.
+//!
+//! `J` is the identity for positive definite matrices, a Cholesky factorization. Symmetric indefinite matrices whose pivots
+//! have known signs in every order of the vertices, such as those of saddle points with a vertex's unknowns kept together,
+//! need no pivoting either: `J` holds the signs.
 
-use super::dense::{factorize_columns, update_rectangle, update_triangle};
+use super::dense::{factorize_columns, times_signs, update_rectangle, update_triangle};
 use super::elimination::{Elimination, strip_start, strip_width};
 use super::pattern::BlockPattern;
 use faer::linalg::matmul::matmul;
 use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
-use faer::{Accum, MatMut, MatRef, Par};
+use faer::{Accum, Mat, MatMut, MatRef, Par};
 use rayon::prelude::*;
 use std::fmt;
 
 /// Fronts with more entries than this are assembled by several threads.
 const SHARED_FRONT: usize = 1 << 18;
 
-/// The matrix is not positive definite in floating-point arithmetic.
+/// The matrix is not positive definite in floating-point arithmetic, or a pivot has not the sign it should have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct NotPositive {
     /// Vertex of the mesh at whose unknowns the factorization broke down.
@@ -23,7 +27,7 @@ impl fmt::Display for NotPositive {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "the matrix is not positive definite: a pivot at vertex {} is not positive",
+            "the matrix is not of the expected definiteness: a pivot at vertex {} has the wrong sign",
             self.vertex
         )
     }
@@ -31,12 +35,14 @@ impl fmt::Display for NotPositive {
 
 impl std::error::Error for NotPositive {}
 
-/// A Cholesky factorization `A = L L^T` that is renewed for matrices of one structure.
+/// A factorization `A = L J L^T` that is renewed for matrices of one structure.
 ///
 /// Memory for the factor and for the work is taken by the first factorization and kept.
 #[derive(Debug)]
 pub struct BlockCholesky<const B: usize> {
     pattern: BlockPattern<B>,
+    /// The diagonal of `J` at the columns of the largest front; empty for the identity.
+    signs: Vec<f64>,
     factor: Vec<f64>,
     arena: Vec<f64>,
     factorized: bool,
@@ -44,13 +50,26 @@ pub struct BlockCholesky<const B: usize> {
 }
 
 impl<const B: usize> BlockCholesky<B> {
+    /// For positive definite matrices.
     pub fn new(pattern: BlockPattern<B>) -> Self {
         Self {
             pattern,
+            signs: Vec::new(),
             factor: Vec::new(),
             arena: Vec::new(),
             factorized: false,
             factorizations: 0,
+        }
+    }
+
+    /// For matrices whose pivots have these signs, `1.0` or `-1.0`, at every vertex.
+    pub fn with_signs(pattern: BlockPattern<B>, signs: [f64; B]) -> Self {
+        let elimination = &pattern.elimination;
+        let fronts = 0..elimination.fronts();
+        let widest = fronts.map(|front| elimination.columns(front)).max().unwrap_or(0);
+        Self {
+            signs: signs.into_iter().cycle().take(widest).collect(),
+            ..Self::new(pattern)
         }
     }
 
@@ -82,6 +101,7 @@ impl<const B: usize> BlockCholesky<B> {
             elimination,
             values,
             shift,
+            signs: (!self.signs.is_empty()).then_some(&self.signs),
         };
         let roots = (0..elimination.fronts() as u32)
             .filter(|&front| elimination.is_root(front))
@@ -145,6 +165,11 @@ impl<const B: usize> BlockCholesky<B> {
                 }
             }
         }
+        if !self.signs.is_empty() {
+            for x in x.chunks_exact_mut(B) {
+                x.iter_mut().zip(&self.signs).for_each(|(x, sign)| *x *= sign);
+            }
+        }
         for front in (0..elimination.fronts()).rev() {
             let (square, below) = self.front(front);
             let (columns, update) = (square.nrows(), below.nrows());
@@ -193,6 +218,7 @@ struct Numeric<'a, const B: usize> {
     elimination: &'a Elimination,
     values: &'a [f64],
     shift: f64,
+    signs: Option<&'a [f64]>,
 }
 
 /// Which end of its working memory a branch leaves its update at.
@@ -286,7 +312,8 @@ impl<const B: usize> Numeric<'_, B> {
             panel.chunks_mut(width * height).enumerate().for_each(assemble);
         }
         let mut matrix = MatMut::from_column_major_slice_mut(panel, height, columns);
-        factorize_columns(matrix.as_mut()).map_err(|column| B * elimination.begin[front] as usize + column)?;
+        let signs = self.signs.map(|signs| &signs[..columns]);
+        factorize_columns(matrix.as_mut(), signs).map_err(|column| B * elimination.begin[front] as usize + column)?;
         let rows = matrix.as_ref().split_at_row(columns).1;
         let mut strips = Vec::with_capacity(size.div_ceil(width));
         let mut rest = update;
@@ -300,8 +327,10 @@ impl<const B: usize> Numeric<'_, B> {
             let width = strip.len() / height;
             let (beside, under) = rows.split_at_row(first).1.split_at_row(width);
             let (square, rectangle) = MatMut::from_column_major_slice_mut(strip, height, width).split_at_row_mut(width);
-            update_triangle(square, beside, Accum::Replace);
-            update_rectangle(rectangle, under, beside, Accum::Replace);
+            let turned = times_signs(beside, signs);
+            let right = turned.as_ref().map_or(beside, Mat::as_ref);
+            update_triangle(square, beside, right, Accum::Replace);
+            update_rectangle(rectangle, under, right, Accum::Replace);
             for &(child, source) in sources {
                 self.extend_add(child, source, columns + first, columns + first, strip, height);
             }

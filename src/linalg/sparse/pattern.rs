@@ -135,37 +135,8 @@ impl<const B: usize> BlockPattern<B> {
             Some(name[vertex as usize]).filter(|&index| index != FIXED)
         });
         let places: Vec<[f64; 3]> = vertices.iter().map(|&vertex| points[vertex as usize]).collect();
-        let elimination = Elimination::new(&graph, &order(&graph, &places), B);
-        let position = inverse(&elimination.order);
-
-        let mut column_offsets = Vec::with_capacity(count + 1);
-        column_offsets.push(0);
-        let mut rows = Vec::with_capacity(count + graph.neighbours.len() / 2);
-        for (column, &vertex) in elimination.order.iter().enumerate() {
-            let start = rows.len();
-            rows.push(column as u32);
-            rows.extend(
-                graph
-                    .neighbours(vertex)
-                    .iter()
-                    .map(|&neighbour| position[neighbour as usize])
-                    .filter(|&row| row > column as u32),
-            );
-            rows[start..].sort_unstable();
-            column_offsets.push(rows.len());
-        }
-        let mut slots = vec![0u32; rows.len()];
-        for front in 0..elimination.fronts() {
-            let (begin, end) = (elimination.begin[front], elimination.begin[front + 1]);
-            let below = elimination.rows(front);
-            for block in column_offsets[begin as usize]..column_offsets[end as usize] {
-                slots[block] = if rows[block] < end {
-                    rows[block] - begin
-                } else {
-                    end - begin + below.partition_point(|&row| row < rows[block]) as u32
-                };
-            }
-        }
+        let structure = Self::of_graph(&graph, &order(&graph, &places));
+        let (position, column_offsets, rows) = (&structure.position, &structure.column_offsets, &structure.rows);
 
         // Sort the parts by the block they belong to, keeping the order of the cells.
         let none = u32::MAX;
@@ -207,15 +178,71 @@ impl<const B: usize> BlockPattern<B> {
         Ok(Self {
             vertices,
             free: name,
-            position,
-            column_offsets,
-            rows,
-            slots,
             part_offsets,
             parts,
             parts_len: cells.len() * pairs,
-            elimination,
+            ..structure
         })
+    }
+
+    /// The structure over the vertices of a graph, all free, in an order of elimination: entry `k` of `order` is the vertex
+    /// to be eliminated `k`-th. Its matrices are filled block by block ([`block`](Self::block)), not from cells.
+    pub fn of_graph(graph: &Graph, order: &[u32]) -> Self {
+        let elimination = Elimination::new(graph, order, B);
+        let count = graph.len();
+        let position = inverse(&elimination.order);
+
+        let mut column_offsets = Vec::with_capacity(count + 1);
+        column_offsets.push(0);
+        let mut rows = Vec::with_capacity(count + graph.neighbours.len() / 2);
+        for (column, &vertex) in elimination.order.iter().enumerate() {
+            let start = rows.len();
+            rows.push(column as u32);
+            rows.extend(
+                graph
+                    .neighbours(vertex)
+                    .iter()
+                    .map(|&neighbour| position[neighbour as usize])
+                    .filter(|&row| row > column as u32),
+            );
+            rows[start..].sort_unstable();
+            column_offsets.push(rows.len());
+        }
+        let mut slots = vec![0u32; rows.len()];
+        for front in 0..elimination.fronts() {
+            let (begin, end) = (elimination.begin[front], elimination.begin[front + 1]);
+            let below = elimination.rows(front);
+            for block in column_offsets[begin as usize]..column_offsets[end as usize] {
+                slots[block] = if rows[block] < end {
+                    rows[block] - begin
+                } else {
+                    end - begin + below.partition_point(|&row| row < rows[block]) as u32
+                };
+            }
+        }
+
+        Self {
+            vertices: (0..count as u32).collect(),
+            free: (0..count as u32).collect(),
+            position,
+            column_offsets,
+            part_offsets: vec![0; rows.len() + 1],
+            rows,
+            slots,
+            parts: Vec::new(),
+            parts_len: 0,
+            elimination,
+        }
+    }
+
+    /// Where a matrix holds the block of two free vertices: the index of its first scalar, and whether the block there is the
+    /// one with `row` and `column` exchanged. `None` where the structure has no such block.
+    pub fn block(&self, row: usize, column: usize) -> Option<(usize, bool)> {
+        let (row, column) = (self.position[row], self.position[column]);
+        let (low, high) = (row.min(column) as usize, row.max(column));
+        let blocks = self.column_offsets[low]..self.column_offsets[low + 1];
+        let found = self.rows[blocks.clone()].binary_search(&high).ok()?;
+        Some((B * B * (blocks.start + found), row < column))
     }
 
     /// Number of unknowns.

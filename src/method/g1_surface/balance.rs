@@ -119,17 +119,23 @@ impl State<'_> {
         for end in 0..2 {
             let change = [y[3 * end], y[3 * end + 1], y[3 * end + 2]];
             let normal = self.network.normals[ends[end] as usize];
-            let moved = add(self.natural[edge][end], times(change, chord / self.stiffness));
-            self.network.tangents[edge][end] = in_plane(moved, normal);
+            if !self.network.on_crease[edge] {
+                let moved = add(self.natural[edge][end], times(change, chord / self.stiffness));
+                self.network.tangents[edge][end] = in_plane(moved, normal);
+            }
             self.free[edge].s[end] = y[6 + end] / [first, second][end];
             self.free[edge].v[end] = y[8 + end];
         }
     }
 
-    /// Factors from scaled to plain unknowns.
+    /// Factors from scaled to plain unknowns; the tangents of creases do not change.
     fn factors(&self, edge: usize) -> [f64; UNKNOWNS] {
         let [chord, first, second] = self.sizes[edge];
-        let t = chord / self.stiffness;
+        let t = if self.network.on_crease[edge] {
+            0.0
+        } else {
+            chord / self.stiffness
+        };
         [t, t, t, t, t, t, 1.0 / first, 1.0 / second, 1.0, 1.0]
     }
 
@@ -297,10 +303,14 @@ fn inner(a: &[f64; UNKNOWNS], b: &[f64; UNKNOWNS]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-/// The inverse of the block of an edge's own two conditions, with a small shift where the curve is straight.
+/// The inverse of the block of an edge's own two conditions, with a small shift where the curve is straight; zero for edges
+/// that may not change.
 fn inverse(edge: &Edge) -> [[f64; 2]; 2] {
     let [p, q, r] = [(4, 4), (4, 5), (5, 5)].map(|(a, b)| inner(&edge.rows[a], &edge.rows[b]));
-    let shift = 1e-14 * (p + r) + 1e-200;
+    if p + r == 0.0 {
+        return [[0.0; 2]; 2];
+    }
+    let shift = 1e-14 * (p + r);
     let (p, r) = (p + shift, r + shift);
     let determinant = p * r - q * q;
     [[r / determinant, -q / determinant], [-q / determinant, p / determinant]]
@@ -493,7 +503,7 @@ pub fn balance(
         let mut accepted = false;
         let mut ended = false;
         while step > 1e-4 {
-            for edge in 0..edges.len() {
+            for edge in (0..edges.len()).filter(|&edge| state_active[edge]) {
                 let y =
                     std::array::from_fn(|unknown| (1.0 - step) * before[edge][unknown] + step * targets[edge][unknown]);
                 state.set(edge, &y);

@@ -167,6 +167,9 @@ pub fn enclose(network: &mut Network, observer: &mut dyn Observer) -> Result<Enc
         let mut step = 1.0;
         let accepted = loop {
             for (edge, tangents) in network.tangents.iter_mut().enumerate() {
+                if network.on_crease[edge] {
+                    continue;
+                }
                 for which in 0..2 {
                     let mut change = [0.0; 3];
                     for end in 0..2 {
@@ -207,8 +210,10 @@ pub fn enclose(network: &mut Network, observer: &mut dyn Observer) -> Result<Enc
     for (edge, tangents) in network.tangents.iter_mut().enumerate() {
         for end in 0..2 {
             // Rounding must not tilt a tangent out of its plane.
-            let normal = network.normals[network.connectivity.edges[edge][end] as usize];
-            tangents[end] = in_plane(tangents[end], normal);
+            if !network.on_crease[edge] {
+                let normal = network.normals[network.connectivity.edges[edge][end] as usize];
+                tangents[end] = in_plane(tangents[end], normal);
+            }
             let change = length(subtract(tangents[end], start[edge][end])) / length(start[edge][end]);
             done.largest_change = done.largest_change.max(change);
         }

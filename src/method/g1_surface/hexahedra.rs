@@ -9,6 +9,7 @@
 use super::edge_normals;
 use super::enclosure;
 use super::network::Network;
+use super::outcome::Metrics;
 use super::patch::{self, Operator, Patch, Reference, Solve};
 use super::problem::Problem;
 use super::surface;
@@ -43,6 +44,34 @@ pub struct Hexahedra {
     pub volume: f64,
 }
 
+impl Hexahedra {
+    /// Adds what is known to the metrics.
+    pub fn tell(&self, metrics: &mut Metrics) {
+        let least = self.scaled.iter().copied().fold(f64::INFINITY, f64::min);
+        for (name, value) in [
+            ("hexahedra_count", self.cells.len() as f64),
+            ("jacobian_min", least),
+            ("jacobian_certified", self.positive as f64),
+            ("jacobian_not_positive", self.not_positive as f64),
+            ("jacobian_undecided", self.undecided as f64),
+            ("jacobian_bound", self.bound),
+            ("hexahedra_volume", self.volume),
+        ] {
+            metrics.insert(name.to_string(), value);
+        }
+    }
+
+    /// The hexahedra as a VTU file of Bezier hexahedra of order 4.
+    pub fn bezier(&self) -> Vec<u8> {
+        let numbers: Vec<f64> = (0..self.cells.len()).map(|index| index as f64).collect();
+        vtu::write_bezier_hexahedra(
+            self.cells.as_flattened(),
+            4,
+            &[("hexahedron", 1, &numbers), ("scaled_jacobian", 1, &self.scaled)],
+        )
+    }
+}
+
 /// Parts into which the certificate may cut a hexahedron.
 const PARTS: usize = 512;
 
@@ -57,10 +86,10 @@ pub fn build(
     layers: usize,
     observer: &mut dyn Observer,
 ) -> Result<Hexahedra, String> {
-    if problem.connectivity.boundary_edges() > 0 {
+    let open = problem.whole().1.boundary_edges();
+    if open > 0 {
         return Err(format!(
-            "hexahedra need a closed surface; this one has {} boundary edges",
-            problem.connectivity.boundary_edges()
+            "hexahedra need a closed surface; this one has {open} boundary edges"
         ));
     }
     let sphere = sphere(problem, shell, observer)?;
@@ -127,7 +156,9 @@ pub fn build(
 
 /// The patches of the sphere.
 fn sphere(problem: &Problem, shell: Shell, observer: &mut dyn Observer) -> Result<Vec<Patch>, String> {
-    let points = &problem.mesh.points;
+    // Creases are no matter to the sphere.
+    let (mesh, connectivity) = problem.whole();
+    let points = &mesh.points;
     let mut low = points[0];
     let mut high = points[0];
     for point in points {
@@ -145,7 +176,7 @@ fn sphere(problem: &Problem, shell: Shell, observer: &mut dyn Observer) -> Resul
     if !(radius > 0.0) {
         return Err("a vertex lies at the centre of the surface's box; no sphere fits inside".to_string());
     }
-    let mut mesh = problem.mesh.clone();
+    let mut mesh = mesh.clone();
     let mut normals = Vec::with_capacity(points.len());
     for point in &mut mesh.points {
         let away = subtract(*point, centre);
@@ -164,7 +195,7 @@ fn sphere(problem: &Problem, shell: Shell, observer: &mut dyn Observer) -> Resul
                 .to_string(),
         );
     }
-    let (mut network, _) = Network::natural(&mesh, problem.connectivity.clone(), &normals)?;
+    let (mut network, _) = Network::natural(&mesh, connectivity.clone(), &normals)?;
     enclosure::enclose(&mut network, observer)?;
     let slopes = edge_normals::exact(&network, true)?;
     let fit = |quad| {

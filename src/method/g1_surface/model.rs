@@ -56,19 +56,46 @@ static RAYS_PARAMETERS: &[Parameter] = &[
     },
 ];
 
+/// The generator that contours the signed distance of the model's surface.
+pub const DUAL_CONTOURING: &str = "dual-contouring";
+
+static DUAL_CONTOURING_PARAMETERS: &[Parameter] = &[
+    Parameter {
+        name: "cells",
+        whole: true,
+        default: 16.0,
+        min: 2.0,
+        max: 512.0,
+        doc: "cubes along the longest side of the surface's box",
+    },
+    Parameter {
+        name: "smoothing",
+        whole: true,
+        default: 20.0,
+        min: 0.0,
+        max: 1000.0,
+        doc: "rounds in which every vertex moves towards the mean of its neighbours and back onto the surface",
+    },
+];
+
 static KIND: LazyLock<ModelKind> = LazyLock::new(|| {
-    let mut meshes: Vec<Generator> = surface::surfaces()
-        .iter()
-        .map(|generator| Generator {
-            name: generator.name,
-            parameters: fields(generator.parameters),
-            doc: generator.doc,
-        })
-        .collect();
+    let generator = |generator: &surface::SurfaceGenerator| Generator {
+        name: generator.name,
+        parameters: fields(generator.parameters),
+        doc: generator.doc,
+    };
+    let mut meshes: Vec<Generator> = surface::surfaces().iter().map(generator).collect();
+    let surfaces: Vec<Generator> = surface::surfaces().iter().map(generator).collect();
     meshes.push(Generator {
         name: RAYS,
         parameters: fields(RAYS_PARAMETERS),
         doc: "the subdivided cube shot along rays from the centre onto the model's `surface`, which must be star-shaped",
+    });
+    meshes.push(Generator {
+        name: DUAL_CONTOURING,
+        parameters: fields(DUAL_CONTOURING_PARAMETERS),
+        doc: "the boundary of the cubes within the model's closed `surface`, of any shape, by dual contouring of its signed \
+              distance",
     });
     ModelKind {
         roles: keep(vec![
@@ -87,8 +114,18 @@ static KIND: LazyLock<ModelKind> = LazyLock::new(|| {
                 file: true,
                 file_parameters: SURFACE_FILE,
                 generator_key: "generate",
+                generators: keep(surfaces),
+                doc: "A triangulated surface on which the vertices lie: it gives normals and distances. Quadrilaterals are \
+                      halved.",
+            },
+            Role {
+                name: "creases",
+                required: false,
+                file: true,
+                file_parameters: &[],
+                generator_key: "generate",
                 generators: &[],
-                doc: "A triangulated surface on which the vertices lie: it gives normals and distances.",
+                doc: "A text file of sharp edges: two vertex numbers a line, counted from 0 in the order of the mesh's file.",
             },
         ]),
     }

@@ -7,6 +7,7 @@
 //! Guaranteed: every curve is perpendicular to the normals at its ends, whatever is done to the tangents by the functions of
 //! this folder. Not guaranteed: that curves do not meet outside their ends.
 
+use super::creases::{self, Creases};
 use super::hermite;
 use crate::linalg::vector3::{add, cross, dot, subtract, times};
 use crate::mesh::length;
@@ -73,11 +74,44 @@ pub struct Network {
     pub connectivity: Connectivity,
     /// Slopes of every edge's curve at its two ends, from the smaller vertex to the larger one.
     pub tangents: Vec<[[f64; 3]; 2]>,
+    /// Whether an edge is one side of a crease: its tangents belong to both sides and stay.
+    pub on_crease: Vec<bool>,
 }
 
 /// The sine between neighbouring curves at a vertex, or the share of a curve's chord within the tangent plane, below which
 /// the tangent plane says nothing about the directions of the curves.
 const FLAT: f64 = 1e-6;
+/// The sine between the normals of a crease's two sides below which they count as one: their common line would be uncertain.
+const SAME: f64 = 1e-4;
+/// The cosine between a crease and the line in which its sides' planes meet, below which they do not belong together.
+const CROOKED: f64 = 0.25;
+/// Rounds in which planes are joined, since one joining may change another.
+const JOINING: usize = 8;
+
+/// The directions that a curve may leave a vertex in.
+enum Allowed {
+    /// The plane perpendicular to a normal.
+    Plane([f64; 3]),
+    /// The line perpendicular to two normals.
+    Line([f64; 3]),
+}
+
+impl Allowed {
+    fn between(n: [f64; 3], m: [f64; 3]) -> Self {
+        if n == m {
+            return Self::Plane(n);
+        }
+        let line = cross(n, m);
+        Self::Line(times(line, 1.0 / length(line)))
+    }
+
+    fn project(&self, vector: [f64; 3]) -> [f64; 3] {
+        match *self {
+            Self::Plane(normal) => in_plane(vector, normal),
+            Self::Line(direction) => times(direction, dot(vector, direction)),
+        }
+    }
+}
 
 impl Network {
     /// The natural cubics of a checked mesh with one normal a vertex.
@@ -89,12 +123,27 @@ impl Network {
         connectivity: Connectivity,
         normals: &[[f64; 3]],
     ) -> Result<(Self, Vec<String>), String> {
+        Self::creased(mesh, connectivity, normals, None)
+    }
+
+    /// The same over a mesh that is cut open along creases: the curve along a crease is the one of least curvature that is
+    /// perpendicular to the normals of both its sides, and the same on both.
+    ///
+    /// # Errors
+    /// As [`Self::natural`], and where two sides' planes meet in a line across their crease.
+    pub fn creased(
+        mesh: &QuadrilateralMesh,
+        connectivity: Connectivity,
+        normals: &[[f64; 3]],
+        creases: Option<&Creases>,
+    ) -> Result<(Self, Vec<String>), String> {
         let mut units = Vec::with_capacity(normals.len());
         for (vertex, &normal) in normals.iter().enumerate() {
             let size = length(normal);
             if !(size > 0.0 && size.is_finite()) {
                 return Err(format!(
-                    "vertex {vertex} (from 0) has no normal: {normal:?}; give a vector of any length but zero"
+                    "vertex {vertex} (from 0) has no normal: {normal:?}; give a vector of any length but zero, or estimate \
+                     all of them (vertex_normals = \"estimated\")"
                 ));
             }
             units.push(normal.map(|component| component / size));
@@ -105,9 +154,13 @@ impl Network {
             normals: units,
             quads: mesh.quads.clone(),
             tangents: Vec::new(),
+            on_crease: vec![false; connectivity.edges.len()],
             connectivity,
         };
-        network.orient_normals(&mut notices)?;
+        network.orient_normals(&mut notices);
+        if let Some(creases) = creases {
+            network.join_planes(creases, &mut notices);
+        }
         network.tangents = network
             .connectivity
             .edges
@@ -120,22 +173,23 @@ impl Network {
                 .tangents
             })
             .collect();
+        if let Some(creases) = creases {
+            network.follow_creases(creases)?;
+        }
         network.check(&mut notices)?;
         Ok((network, notices))
     }
 
     /// Turns all normals round where most of them point to the back of their quads.
-    fn orient_normals(&mut self, notices: &mut Vec<String>) -> Result<(), String> {
-        let mut backward = 0usize;
-        for quad in &self.quads {
-            let corners = quad.map(|vertex| self.points[vertex as usize]);
-            let face = cross(subtract(corners[2], corners[0]), subtract(corners[3], corners[1]));
-            backward += quad
-                .iter()
-                .filter(|&&vertex| dot(face, self.normals[vertex as usize]) < 0.0)
-                .count();
-        }
-        if 2 * backward > 4 * self.quads.len() {
+    fn orient_normals(&mut self, notices: &mut Vec<String>) {
+        let mesh = QuadrilateralMesh {
+            points: std::mem::take(&mut self.points),
+            quads: std::mem::take(&mut self.quads),
+            normals: None,
+        };
+        let backward = creases::point_backward(&mesh, &self.normals, |_| true);
+        (self.points, self.quads) = (mesh.points, mesh.quads);
+        if backward {
             for normal in &mut self.normals {
                 *normal = normal.map(|component| -component);
             }
@@ -143,6 +197,100 @@ impl Network {
                 "the normals point to the side from which the quadrilaterals are seen clockwise; turned round"
                     .to_string(),
             );
+        }
+    }
+
+    /// The ends of a crease's two sides, that of the first side first: `ends[e]` are the vertices at end `e` of the first
+    /// side's edge. The last part tells whether both edges run the same way.
+    fn crease_ends(&self, creases: &Creases, [first, second]: [u32; 2]) -> ([[usize; 2]; 2], bool) {
+        let [a, b] = self.connectivity.edges[first as usize].map(|vertex| vertex as usize);
+        let [c, d] = self.connectivity.edges[second as usize].map(|vertex| vertex as usize);
+        let alike = creases.original[a] == creases.original[c];
+        (if alike { [[a, c], [b, d]] } else { [[a, d], [b, c]] }, alike)
+    }
+
+    /// Gives both sides of a crease one normal at vertices where their planes all but agree, or meet in a line across the
+    /// crease: it has no direction there that both sides could follow.
+    fn join_planes(&mut self, creases: &Creases, notices: &mut Vec<String>) {
+        let mut crooked: Vec<u32> = Vec::new();
+        for _ in 0..JOINING {
+            let mut changed = false;
+            for &pair in &creases.pairs {
+                let (ends, _) = self.crease_ends(creases, pair);
+                let chord = subtract(self.points[ends[1][0]], self.points[ends[0][0]]);
+                for [a, b] in ends {
+                    let (n, m) = (self.normals[a], self.normals[b]);
+                    let line = cross(n, m);
+                    let sine = length(line);
+                    let across = dot(line, chord).abs() < CROOKED * sine * length(chord);
+                    if n == m || (sine > SAME && !across) {
+                        continue;
+                    }
+                    let sum = add(n, m);
+                    if !(length(sum) > FLAT) {
+                        continue;
+                    }
+                    if sine > SAME && !crooked.contains(&creases.original[a]) {
+                        crooked.push(creases.original[a]);
+                    }
+                    let mean = times(sum, 1.0 / length(sum));
+                    (self.normals[a], self.normals[b]) = (mean, mean);
+                    changed = true;
+                }
+            }
+            if !changed {
+                break;
+            }
+        }
+        if let Some(first) = crooked.first() {
+            notices.push(format!(
+                "at {} vertices, the first is vertex {first}, the planes of a crease's two sides meet in a line that runs \
+                 across it: they share one normal there",
+                crooked.len()
+            ));
+        }
+    }
+
+    /// Sets the tangents along creases: the integral of `|X''|^2` is least for `2 t1 + P1 t2 = 3 P1 d`,
+    /// `P2 t1 + 2 t2 = 3 P2 d` with the projections `P` onto the directions perpendicular to the normals of both sides.
+    fn follow_creases(&mut self, creases: &Creases) -> Result<(), String> {
+        for &pair in &creases.pairs {
+            let (ends, alike) = self.crease_ends(creases, pair);
+            let chord = subtract(self.points[ends[1][0]], self.points[ends[0][0]]);
+            let [first, second] = ends.map(|[a, b]| Allowed::between(self.normals[a], self.normals[b]));
+            // t1 eliminated: (4 - P2 P1) t2 = 6 P2 d - 3 P2 P1 d.
+            let columns: [[f64; 3]; 3] = std::array::from_fn(|axis| {
+                let mut unit = [0.0; 3];
+                unit[axis] = 1.0;
+                subtract(times(unit, 4.0), second.project(first.project(unit)))
+            });
+            let matrix = nalgebra::Matrix3::from_columns(&columns.map(nalgebra::Vector3::from));
+            let rhs = subtract(
+                times(second.project(chord), 6.0),
+                times(second.project(first.project(chord)), 3.0),
+            );
+            // Projections do not lengthen: the matrix is at least 3 times the identity.
+            let solved = matrix.lu().solve(&nalgebra::Vector3::from(rhs));
+            let t2 = second.project(solved.map_or(chord, Into::into));
+            let t1 = first.project(times(subtract(times(chord, 3.0), t2), 0.5));
+            for (tangent, [a, _]) in [t1, t2].into_iter().zip(ends) {
+                if !(dot(tangent, chord) > FLAT * dot(chord, chord)) {
+                    let [p, q] = ends.map(|[a, _]| creases.original[a]);
+                    return Err(format!(
+                        "at vertex {} the planes of the two sides of the crease between vertices {p} and {q} (counted from 0) \
+                         meet in a line across it; correct the normals, or take the edge out of the creases",
+                        creases.original[a]
+                    ));
+                }
+            }
+            let [one, other] = pair.map(|edge| edge as usize);
+            self.tangents[one] = [t1, t2];
+            self.tangents[other] = if alike {
+                [t1, t2]
+            } else {
+                [times(t2, -1.0), times(t1, -1.0)]
+            };
+            (self.on_crease[one], self.on_crease[other]) = (true, true);
         }
         Ok(())
     }

@@ -1,12 +1,13 @@
 //! What is reported of a surface: its metrics and a tessellation with fields to colour it by.
 
 use super::continuity::{self, Continuity};
+use super::evaluation::{Derivatives, Evaluated, Places, evaluate};
 use super::patch::{GAUSS_5, Patch};
 use super::problem::{Problem, Truth};
 use super::settings::Settings;
-use super::surface::{self, Place};
-use crate::linalg::vector3::{add, dot, subtract, times};
-use crate::mesh::format::{Cells, vtu};
+use crate::linalg::processor::Processor;
+use crate::linalg::vector3::{add, cross, dot, subtract, times};
+use crate::mesh::format::{self, Cells, Content, Field, Format, vtu};
 use crate::mesh::quadrilateral::Connectivity;
 use crate::mesh::{diagonal, length};
 use rayon::prelude::*;
@@ -15,20 +16,45 @@ use std::collections::BTreeMap;
 /// Metrics of the patches by name.
 pub type Metrics = BTreeMap<String, f64>;
 
-/// Whether a patch with these normals at its corners has a normal, among 9 by 9, that points against them.
-pub fn folds(patch: &Patch, corners: [[f64; 3]; 4]) -> bool {
-    let place = |index: usize| index as f64 / (SAMPLES - 1) as f64;
-    (0..SAMPLES).any(|i| {
-        let u = Place::new(place(i));
-        (0..SAMPLES).any(|j| {
-            let v = Place::new(place(j));
-            let (s, t) = (place(i), place(j));
-            let low = add(times(corners[0], 1.0 - s), times(corners[1], s));
-            let high = add(times(corners[3], 1.0 - s), times(corners[2], s));
-            let expected = add(times(low, 1.0 - t), times(high, t));
-            !(dot(surface::first_derivatives(patch, &u, &v).area_vector(), expected) > 0.0)
+/// Points along each parameter at which a patch is looked at.
+const SAMPLES: usize = 9;
+
+/// Looks for folds at 9 by 9 points of patches.
+pub struct Folding {
+    places: Places,
+    /// Weights of the corners' normals at every point.
+    weights: Vec<[f64; 4]>,
+    processor: Processor,
+}
+
+impl Default for Folding {
+    fn default() -> Self {
+        let line: [f64; SAMPLES] = std::array::from_fn(|index| index as f64 / (SAMPLES - 1) as f64);
+        let weights = line
+            .iter()
+            .flat_map(|&t| line.map(|s| [(1.0 - s) * (1.0 - t), s * (1.0 - t), s * t, (1.0 - s) * t]));
+        Self {
+            places: Places::grid(&line, &line),
+            weights: weights.collect(),
+            processor: Processor::detect(),
+        }
+    }
+}
+
+impl Folding {
+    /// Whether a patch with these normals at its corners has a normal that points against them. The patch's positions and
+    /// first derivatives are left in `evaluated`.
+    pub fn folds(&self, patch: &Patch, corners: [[f64; 3]; 4], evaluated: &mut Evaluated) -> bool {
+        evaluate(self.processor, patch, &self.places, Derivatives::First, evaluated);
+        self.weights.iter().enumerate().any(|(point, weights)| {
+            let [_, u, v] = evaluated.first(point);
+            let mut expected = [0.0; 3];
+            for (&weight, corner) in weights.iter().zip(corners) {
+                expected = add(expected, times(corner, weight));
+            }
+            !(dot(cross(u, v), expected) > 0.0)
         })
-    })
+    }
 }
 
 /// What one patch adds to the metrics.
@@ -41,35 +67,33 @@ struct Measured {
     distance_squares: f64,
 }
 
-/// Samples along each parameter of a patch.
-const SAMPLES: usize = 9;
-
 /// Measures patches over a problem's mesh: continuity, distance, folds, area, curvature.
 pub fn measure(problem: &Problem, normals: &[[f64; 3]], patches: &[Patch], metrics: &mut Metrics) -> Continuity {
-    let places: [Place; SAMPLES] = std::array::from_fn(|index| Place::new(index as f64 / (SAMPLES - 1) as f64));
-    let gauss = GAUSS_5.map(|(x, weight)| (Place::new(x), weight));
+    let folding = Folding::default();
+    let line = GAUSS_5.map(|(x, _)| x);
+    let gauss = Places::grid(&line, &line);
+    let weights: Vec<f64> = GAUSS_5.iter().flat_map(|(_, v)| GAUSS_5.map(|(_, u)| u * v)).collect();
     let measured: Vec<Measured> = patches
         .par_iter()
         .zip(&problem.mesh.quads)
-        .map(|(patch, quad)| {
+        .enumerate()
+        .map_init(Evaluated::default, |evaluated, (index, (patch, quad))| {
             let mut found = Measured::default();
-            for (u, weight_u) in &gauss {
-                for (v, weight_v) in &gauss {
-                    let jet = surface::evaluate(patch, u, v);
-                    let area = length(jet.area_vector()) * weight_u * weight_v;
-                    let [sum, product] = jet.curvatures();
-                    found.area += area;
-                    found.curvature += area * (sum * sum - 2.0 * product);
-                }
+            evaluate(folding.processor, patch, &gauss, Derivatives::Second, evaluated);
+            for (jet, weight) in evaluated.jets().zip(&weights) {
+                let area = length(jet.area_vector()) * weight;
+                let [sum, product] = jet.curvatures();
+                found.area += area;
+                found.curvature += area * (sum * sum - 2.0 * product);
             }
-            found.folded = folds(patch, quad.map(|vertex| normals[vertex as usize]));
+            let corners = quad.map(|vertex| normals[vertex as usize]);
+            found.folded = folding.folds(patch, corners, evaluated);
             if let Some(truth) = &problem.truth {
-                for u in &places {
-                    for v in &places {
-                        let distance = truth.distance(surface::position(patch, u, v));
-                        found.distance_max = found.distance_max.max(distance);
-                        found.distance_squares += distance * distance;
-                    }
+                for point in 0..evaluated.len() {
+                    let [position, _, _] = evaluated.first(point);
+                    let distance = truth.distance(index, position);
+                    found.distance_max = found.distance_max.max(distance);
+                    found.distance_squares += distance * distance;
                 }
             }
             found
@@ -93,14 +117,21 @@ pub fn measure(problem: &Problem, normals: &[[f64; 3]], patches: &[Patch], metri
     }
     set("angle_max", continuity.largest);
     set("angle_rms", continuity.mean_square);
-    set("gap", continuity.gap / diagonal(&problem.mesh.points));
+    let size = diagonal(&problem.mesh.points);
+    set("gap", continuity.gap / size);
+    if let Some(creases) = &problem.creases {
+        let [gap, angle] = continuity::measure_creases(patches, &problem.connectivity, &creases.pairs);
+        set("crease_gap", gap / size);
+        set("crease_angle", angle);
+    }
     continuity
 }
 
 impl Truth {
-    /// The distance of a point near the surface.
-    pub fn distance(&self, point: [f64; 3]) -> f64 {
+    /// The distance of a point near the surface; of a point over this quad, where every quad lies on a piece.
+    pub fn distance(&self, quad: usize, point: [f64; 3]) -> f64 {
         match self {
+            Truth::Pieces(creased) => creased.pieces[creased.piece_of[quad] as usize].distance(point),
             Truth::Analytic(exact) => exact.distance(point),
             Truth::Sampled(surface) => surface.distance(point),
         }
@@ -118,31 +149,74 @@ pub fn pieces(settings: &Settings, patches: usize) -> usize {
         .map_or(affordable.clamp(1, 12), |pieces| pieces as usize)
 }
 
-/// A tessellation of the patches as a VTU file: every patch in `pieces` by `pieces` quads that share points with their
-/// neighbours, and on every quad the patch's number, its largest angle to a neighbour, curvatures, isophote stripes.
+/// A tessellation of the patches.
+pub struct Tessellation {
+    pub points: Vec<[f64; 3]>,
+    /// One a point: the mean of those of the patches that share it.
+    pub normals: Vec<[f64; 3]>,
+    pub quads: Vec<[u32; 4]>,
+    /// On every quad, see [`FIELDS`].
+    pub fields: [Vec<f64>; FIELDS.len()],
+}
+
+/// Names of a tessellation's fields.
+pub const FIELDS: [&str; 6] = [
+    "isophotes",
+    "reflection_lines",
+    "angle_to_neighbour",
+    "mean_curvature",
+    "gauss_curvature",
+    "patch",
+];
+
+/// Light from the front left, above, and the viewer there: isophotes are lines of one angle to it.
+const LIGHT: [f64; 3] = [-0.36, -0.8, 0.48];
+/// Perpendicular to it: the direction of the tubes of light.
+const ALONG: [f64; 3] = [0.911_921_505_175_171_6, -0.410_364_677_328_827_2, 0.0];
+
+/// A stripe of width one half around every whole number, with soft edges.
+fn stripe(phase: f64) -> f64 {
+    (0.5 + (std::f64::consts::TAU * phase).cos()).clamp(0.0, 1.0)
+}
+
+/// Isophote stripe and reflection-line stripe for a unit normal, with so many stripes between a normal towards the light and
+/// one away from it.
+///
+/// Reflection lines are what a far viewer sees of long parallel tubes of light at equal angles on a cylinder around the
+/// surface (Klass 1980, Correction of local surface irregularities using reflection lines).
+fn stripes_of(normal: [f64; 3], stripes: f64) -> [f64; 2] {
+    let cosine = dot(normal, LIGHT);
+    let reflected = subtract(times(normal, 2.0 * cosine), LIGHT);
+    let angle = dot(reflected, cross(LIGHT, ALONG)).atan2(dot(reflected, LIGHT));
+    [
+        stripe(0.5 * stripes * cosine),
+        stripe(0.5 * stripes * angle / std::f64::consts::PI),
+    ]
+}
+
+/// Tessellates every patch in `pieces` by `pieces` quads that share points with their neighbours.
 pub fn tessellate(
     patches: &[Patch],
     connectivity: &Connectivity,
     quads: &[[u32; 4]],
-    continuity: &Continuity,
+    angles: &[f64],
     pieces: usize,
     stripes: f64,
-) -> Vec<u8> {
+) -> Tessellation {
     let inner = pieces - 1;
     let vertices = connectivity.stars.len();
     let first_inner = vertices + connectivity.edges.len() * inner;
     let mut points = vec![[0.0; 3]; first_inner + patches.len() * inner * inner];
     let mut normals = points.clone();
     let mut cells = Vec::with_capacity(patches.len() * pieces * pieces);
-    let mut fields: [Vec<f64>; 5] = Default::default();
-    let corners: Vec<Place> = (0..=pieces)
-        .map(|index| Place::new(index as f64 / pieces as f64))
-        .collect();
-    let centres: Vec<Place> = (0..pieces)
-        .map(|index| Place::new((index as f64 + 0.5) / pieces as f64))
-        .collect();
-    // Light from the front left, above; isophotes are lines of one angle to it.
-    let light = [-0.36, -0.8, 0.48];
+    let mut fields: [Vec<f64>; FIELDS.len()] = Default::default();
+    let line = |count: usize, shift: f64| -> Vec<f64> {
+        (0..count).map(|index| (index as f64 + shift) / pieces as f64).collect()
+    };
+    let (corners, centres) = (line(pieces + 1, 0.0), line(pieces, 0.5));
+    let (corners, centres) = (Places::grid(&corners, &corners), Places::grid(&centres, &centres));
+    let processor = Processor::detect();
+    let mut evaluated = Evaluated::default();
     for (index, (patch, quad)) in patches.iter().zip(quads).enumerate() {
         let edges = connectivity.quad_edges[index];
         // The number of the point (i, j) of this patch.
@@ -164,33 +238,25 @@ pub fn tessellate(
                 (i, j) => first_inner + (index * inner + j - 1) * inner + i - 1,
             }
         };
+        evaluate(processor, patch, &corners, Derivatives::First, &mut evaluated);
         for j in 0..=pieces {
             for i in 0..=pieces {
-                let jet = surface::first_derivatives(patch, &corners[i], &corners[j]);
+                let [position, u, v] = evaluated.first(i + (pieces + 1) * j);
                 let place = name(i, j);
-                points[place] = jet.position;
-                let area = jet.area_vector();
+                points[place] = position;
+                let area = cross(u, v);
                 normals[place] = add(normals[place], times(area, 1.0 / length(area).max(f64::MIN_POSITIVE)));
             }
         }
-        let defect = edges
-            .iter()
-            .map(|&edge| continuity.of_edge[edge as usize])
-            .fold(0.0, f64::max);
+        evaluate(processor, patch, &centres, Derivatives::Second, &mut evaluated);
         for j in 0..pieces {
             for i in 0..pieces {
                 cells.push([(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)].map(|(i, j)| name(i, j) as u32));
-                let jet = surface::evaluate(patch, &centres[i], &centres[j]);
+                let jet = evaluated.jet(i + pieces * j);
                 let area = jet.area_vector();
                 let [sum, product] = jet.curvatures();
-                let phase = stripes * dot(area, light) / length(area);
-                let values = [
-                    index as f64,
-                    defect,
-                    f64::from(u8::from(phase.rem_euclid(1.0) < 0.5)),
-                    sum / 2.0,
-                    product,
-                ];
+                let [isophote, reflection] = stripes_of(times(area, 1.0 / length(area)), stripes);
+                let values = [isophote, reflection, angles[index], sum / 2.0, product, index as f64];
                 for (field, value) in fields.iter_mut().zip(values) {
                     field.push(if value.is_finite() { value } else { 0.0 });
                 }
@@ -200,57 +266,65 @@ pub fn tessellate(
     for normal in &mut normals {
         *normal = times(*normal, 1.0 / length(*normal).max(f64::MIN_POSITIVE));
     }
-    let [number, defect, isophotes, mean, gauss] = &fields;
-    vtu::write(
-        &points,
-        Cells {
-            quads: &cells,
-            ..Cells::default()
-        },
-        &[("normals", 3, normals.as_flattened())],
-        &[
-            ("isophotes", 1, isophotes),
-            ("angle_to_neighbour", 1, defect),
-            ("mean_curvature", 1, mean),
-            ("gauss_curvature", 1, gauss),
-            ("patch", 1, number),
-        ],
-    )
+    Tessellation {
+        points,
+        normals,
+        quads: cells,
+        fields,
+    }
 }
 
-/// The control nets of all patches as a VTU file: 25 points a patch, `5 i + j` for `B_i(u) B_j(v)` of degree 4, and 16 quads.
-pub fn control_nets(patches: &[Patch]) -> Vec<u8> {
-    let points: Vec<[f64; 3]> = patches.iter().flat_map(surface::control_points).collect();
-    let mut cells = Vec::with_capacity(16 * patches.len());
-    let mut numbers = Vec::with_capacity(16 * patches.len());
-    for index in 0..patches.len() {
-        for i in 0..4 {
-            for j in 0..4 {
-                let corners = [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)];
-                cells.push(corners.map(|(i, j)| (25 * index + 5 * i + j) as u32));
-                numbers.push(index as f64);
-            }
-        }
+impl Tessellation {
+    /// As a VTU file with all fields.
+    pub fn vtu(&self) -> Vec<u8> {
+        let fields: Vec<vtu::FieldView<'_>> = FIELDS
+            .into_iter()
+            .zip(&self.fields)
+            .map(|(name, values)| (name, 1, &values[..]))
+            .collect();
+        vtu::write(
+            &self.points,
+            Cells {
+                quads: &self.quads,
+                ..Cells::default()
+            },
+            &[("normals", 3, self.normals.as_flattened())],
+            &fields,
+        )
     }
-    vtu::write(
-        &points,
-        Cells {
-            quads: &cells,
-            ..Cells::default()
-        },
-        &[],
-        &[("patch", 1, &numbers)],
-    )
+
+    /// As an OBJ file with normals.
+    ///
+    /// # Errors
+    /// When the writer refuses.
+    pub fn obj(&self) -> Result<Vec<u8>, String> {
+        let content = Content {
+            points: self.points.clone(),
+            quads: self.quads.clone(),
+            point_data: vec![Field {
+                name: "normals".to_string(),
+                components: 3,
+                values: self.normals.as_flattened().to_vec(),
+            }],
+            ..Content::default()
+        };
+        Ok(format::write(Format::Obj, &content)?.bytes)
+    }
+}
+
+/// For every patch the largest angle to a neighbour over its smooth edges, in degrees.
+pub fn angles_to_neighbours(connectivity: &Connectivity, continuity: &Continuity) -> Vec<f64> {
+    let largest = |edges: &[u32; 4]| {
+        let angles = edges.iter().map(|&edge| continuity.of_edge[edge as usize]);
+        angles.fold(0.0, f64::max)
+    };
+    connectivity.quad_edges.iter().map(largest).collect()
 }
 
 /// The mean length of the chords of the edges.
 pub fn mean_edge(problem: &Problem) -> f64 {
-    let edges = &problem.connectivity.edges;
-    let chord = |&[a, b]: &[u32; 2]| {
-        length(subtract(
-            problem.mesh.points[b as usize],
-            problem.mesh.points[a as usize],
-        ))
-    };
+    let (mesh, connectivity) = problem.whole();
+    let edges = &connectivity.edges;
+    let chord = |&[a, b]: &[u32; 2]| length(subtract(mesh.points[b as usize], mesh.points[a as usize]));
     edges.iter().map(chord).sum::<f64>() / edges.len().max(1) as f64
 }

@@ -1,14 +1,15 @@
 //! The problem that a model poses: a checked surface of quadrilaterals with a normal at every vertex, and the surface on
 //! which the vertices lie, where it is known.
 
-use super::model::RAYS;
+use super::creases::{self, Creases, Sources};
+use super::model::{DUAL_CONTOURING, RAYS};
 use super::sampled::Sampled;
 use super::settings::{Settings, VertexNormals};
 use super::vertex_normals;
 use crate::mesh::TriangleMesh;
 use crate::mesh::check::{self, Severity};
 use crate::mesh::format;
-use crate::mesh::generate::surface::{self, analytic::Analytic};
+use crate::mesh::generate::surface::{self, Creased, analytic::Analytic};
 use crate::mesh::quadrilateral::{self, Connectivity, QuadrilateralMesh, Triangles};
 use crate::method::Failure;
 use crate::method::model::{LoadedModel, Part};
@@ -18,6 +19,8 @@ use serde_json::Value;
 #[derive(Clone, Debug)]
 pub enum Truth {
     Analytic(Analytic),
+    /// Smooth pieces that meet in creases.
+    Pieces(Creased),
     Sampled(Sampled),
 }
 
@@ -29,6 +32,8 @@ pub struct Problem {
     /// One a vertex, of any length.
     pub normals: Vec<[f64; 3]>,
     pub truth: Option<Truth>,
+    /// Where the mesh was cut open along creases.
+    pub creases: Option<Creases>,
     pub notices: Vec<String>,
 }
 
@@ -39,104 +44,187 @@ pub(super) fn invalid(reason: String) -> Failure {
     }
 }
 
+/// A mesh as the model gives it, and what comes with it.
+struct Given {
+    mesh: QuadrilateralMesh,
+    truth: Option<Truth>,
+    sources: Sources,
+}
+
 impl Problem {
-    /// Reads or generates the model, checks it and finds the normals.
+    /// Reads or generates the model, checks it, cuts it along its creases and finds the normals.
     ///
     /// # Errors
     /// `invalid-input` for a mesh or normals that cannot be used.
     pub fn new(model: &LoadedModel, settings: &Settings) -> Result<Problem, Failure> {
         let mut notices = Vec::new();
-        let part = model
-            .parts
-            .get("mesh")
-            .ok_or_else(|| invalid("the model has no `mesh`; give it a file or a generator".to_string()))?;
         let sampled = match model.parts.get("surface") {
             Some(part) => Some(Sampled::new(read_surface(part, &mut notices)?)),
             None => None,
         };
-        let (mut mesh, truth) = match part {
-            Part::Generated { generator, parameters } if generator == RAYS => {
-                let Some(sampled) = &sampled else {
-                    return Err(invalid(
-                        "the generator \"rays\" shoots at the model's `surface`, and the model has none; add surface = \
-                         \"FILE\" with a closed triangulated surface"
-                            .to_string(),
-                    ));
-                };
-                let number = |name: &str| parameters.get(name).and_then(Value::as_u64).unwrap_or(0) as usize;
-                let mesh = sampled
-                    .quads(number("cells"), number("smoothing"))
-                    .map_err(|reason| invalid(format!("generator \"rays\" of the mesh: {reason}")))?;
-                (mesh, None)
-            }
-            Part::Generated { generator, parameters } => {
-                let generated = surface::generate_surface(generator, parameters)
-                    .map_err(|reason| invalid(format!("generator \"{generator}\" of the mesh: {reason}")))?;
-                (generated.mesh, generated.exact.map(Truth::Analytic))
-            }
-            Part::File {
-                name,
-                bytes,
-                parameters,
-            } => (read_quads(name, bytes, parameters, &mut notices)?, None),
-        };
+        let Given {
+            mut mesh,
+            truth,
+            mut sources,
+        } = given(model, settings, sampled.as_ref(), &mut notices)?;
+        if let Some(part) = model.parts.get("creases") {
+            sources.listed.extend(read_creases(part, &mesh, &sources)?);
+        }
         for problem in quadrilateral::check(&mut mesh) {
             match problem.severity {
                 Severity::Error => return Err(invalid(format!("mesh: {}", problem.message))),
                 Severity::Warning | Severity::Repaired => notices.push(format!("mesh: {}", problem.message)),
             }
         }
-        let connectivity = Connectivity::of(&mesh.quads, mesh.points.len()).map_err(|defects| {
+        let mut connectivity = Connectivity::of(&mesh.quads, mesh.points.len()).map_err(|defects| {
             invalid(format!(
                 "mesh: the quadrilaterals form no oriented surface: {defects:?}"
             ))
         })?;
         let truth = truth.or(sampled.map(Truth::Sampled));
-        let given = mesh.normals.take();
-        let normals = match (settings.vertex_normals, given) {
-            (VertexNormals::Auto | VertexNormals::Given, Some(normals)) => normals,
-            (VertexNormals::Given, None) => {
-                return Err(invalid(
-                    "the mesh has no normals; add them to the file (OBJ `vn`, VTK `NORMALS`), or use vertex_normals = \
-                     \"estimated\""
-                        .to_string(),
-                ));
+        let mut creases = None;
+        if settings.keeps_creases() {
+            let sharp = creases::sharp(&mesh, &connectivity, &sources, settings).map_err(invalid)?;
+            if sharp.contains(&true) {
+                creases = creases::cut(&mut mesh, &mut connectivity, sharp, &mut notices);
             }
-            (VertexNormals::Auto, None) | (VertexNormals::Surface, _) if matches!(truth, Some(Truth::Sampled(_))) => {
-                match &truth {
-                    Some(Truth::Sampled(surface)) => {
-                        mesh.points.iter().map(|&point| surface.project(point).1).collect()
-                    }
-                    _ => Vec::new(),
-                }
-            }
-            (VertexNormals::Surface, _) => {
-                return Err(invalid(
-                    "the model has no `surface` to take normals from; add one, or use vertex_normals = \"estimated\""
-                        .to_string(),
-                ));
-            }
-            (VertexNormals::Auto | VertexNormals::Estimated, _) => {
-                notices.push("normals estimated from the quadrilaterals around each vertex".to_string());
-                vertex_normals::estimate(&mesh, &connectivity).map_err(|reason| invalid(format!("mesh: {reason}")))?
-            }
-        };
+        }
+        let mut normals = normals(&mut mesh, &connectivity, truth.as_ref(), settings, &mut notices)?;
+        if let Some(creases) = &creases {
+            creases::normals_by_side(creases, &mesh, &connectivity, truth.as_ref(), &mut normals)
+                .map_err(|reason| invalid(format!("mesh: {reason}")))?;
+        }
         Ok(Problem {
             mesh,
             connectivity,
             normals,
             truth,
+            creases,
             notices,
         })
     }
+
+    /// The mesh before it was cut along creases, quads in the same order.
+    pub fn whole(&self) -> (&QuadrilateralMesh, &Connectivity) {
+        match &self.creases {
+            Some(creases) => (&creases.whole, &creases.whole_connectivity),
+            None => (&self.mesh, &self.connectivity),
+        }
+    }
+}
+
+/// Reads or generates the mesh.
+fn given(
+    model: &LoadedModel,
+    settings: &Settings,
+    sampled: Option<&Sampled>,
+    notices: &mut Vec<String>,
+) -> Result<Given, Failure> {
+    let part = model
+        .parts
+        .get("mesh")
+        .ok_or_else(|| invalid("the model has no `mesh`; give it a file or a generator".to_string()))?;
+    if let (Part::Generated { .. }, Some(field)) = (part, &settings.crease_field) {
+        return Err(invalid(format!(
+            "crease_field = \"{field}\" names a field of a file, but the mesh is generated; leave it out"
+        )));
+    }
+    match part {
+        Part::Generated { generator, parameters } if generator == RAYS || generator == DUAL_CONTOURING => {
+            let Some(sampled) = sampled else {
+                return Err(invalid(format!(
+                    "the generator \"{generator}\" needs the model's `surface`, and the model has none; add surface = \
+                     \"FILE\" with a closed triangulated surface"
+                )));
+            };
+            let number = |name: &str| parameters.get(name).and_then(Value::as_u64).unwrap_or(0) as usize;
+            let (cells, smoothing) = (number("cells"), number("smoothing"));
+            let mesh = if generator == RAYS {
+                sampled.by_rays(cells, smoothing)
+            } else {
+                sampled.by_dual_contouring(cells, smoothing)
+            };
+            Ok(Given {
+                mesh: mesh.map_err(|reason| invalid(format!("generator \"{generator}\" of the mesh: {reason}")))?,
+                truth: None,
+                sources: Sources::default(),
+            })
+        }
+        Part::Generated { generator, parameters } => {
+            let generated = surface::generate_surface(generator, parameters)
+                .map_err(|reason| invalid(format!("generator \"{generator}\" of the mesh: {reason}")))?;
+            let listed = generated.creased.as_ref().map(|creased| creased.sharp.clone());
+            let pieces = generated.creased.map(Truth::Pieces);
+            Ok(Given {
+                mesh: generated.mesh,
+                truth: generated.exact.map(Truth::Analytic).or(pieces),
+                sources: Sources {
+                    listed: listed.unwrap_or_default(),
+                    ..Sources::default()
+                },
+            })
+        }
+        Part::File {
+            name,
+            bytes,
+            parameters,
+        } => read_quads(name, bytes, parameters, settings, notices),
+    }
+}
+
+/// The normals at the vertices, from where the settings say. Takes those of the mesh.
+fn normals(
+    mesh: &mut QuadrilateralMesh,
+    connectivity: &Connectivity,
+    truth: Option<&Truth>,
+    settings: &Settings,
+    notices: &mut Vec<String>,
+) -> Result<Vec<[f64; 3]>, Failure> {
+    let given = mesh.normals.take();
+    match (settings.vertex_normals, given, truth) {
+        (VertexNormals::Auto | VertexNormals::Given, Some(normals), _) => Ok(normals),
+        (VertexNormals::Given, None, _) => Err(invalid(
+            "the mesh has no normals; add them to the file (OBJ `vn`, VTK `NORMALS`), or use vertex_normals = \
+             \"estimated\""
+                .to_string(),
+        )),
+        (VertexNormals::Auto, None, Some(Truth::Sampled(surface)))
+        | (VertexNormals::Surface, _, Some(Truth::Sampled(surface))) => {
+            Ok(mesh.points.iter().map(|&point| surface.project(point).1).collect())
+        }
+        (VertexNormals::Surface, _, _) => Err(invalid(
+            "the model has no `surface` to take normals from; add one, or use vertex_normals = \"estimated\""
+                .to_string(),
+        )),
+        (VertexNormals::Auto | VertexNormals::Estimated, _, _) => {
+            notices.push("normals estimated from the quadrilaterals around each vertex".to_string());
+            vertex_normals::estimate(mesh, connectivity).map_err(|reason| invalid(format!("mesh: {reason}")))
+        }
+    }
+}
+
+/// The edges that a text file lists.
+fn read_creases(part: &Part, mesh: &QuadrilateralMesh, sources: &Sources) -> Result<Vec<[u32; 2]>, Failure> {
+    let Part::File { name, bytes, .. } = part else {
+        return Err(invalid("the model's `creases` must be a file".to_string()));
+    };
+    let text = std::str::from_utf8(bytes).map_err(|error| {
+        invalid(format!(
+            "{name}: byte {} is no text; write two vertex numbers a line",
+            error.valid_up_to()
+        ))
+    })?;
+    let vertices = sources.vertices.unwrap_or(mesh.points.len());
+    creases::parse(text, vertices).map_err(|reason| invalid(format!("{name}: {reason}")))
 }
 
 fn read_quads(
     name: &str,
     bytes: &[u8],
     parameters: &Value,
+    settings: &Settings,
     notices: &mut Vec<String>,
-) -> Result<QuadrilateralMesh, Failure> {
+) -> Result<Given, Failure> {
     let content = format::read(name, bytes).map_err(|error| invalid(error.to_string()))?;
     notices.extend(content.notices.iter().map(|notice| format!("{name}: {notice}")));
     let split = parameters.get("triangles").and_then(Value::as_str) == Some("split");
@@ -148,24 +236,46 @@ fn read_quads(
     for point in &mut mesh.points {
         *point = point.map(|coordinate| coordinate * scale);
     }
-    Ok(mesh)
+    let labels = match &settings.crease_field {
+        Some(field) if settings.keeps_creases() => {
+            Some(creases::labels(&content, field).map_err(|reason| invalid(format!("{name}: {reason}")))?)
+        }
+        _ => None,
+    };
+    Ok(Given {
+        mesh,
+        truth: None,
+        sources: Sources {
+            listed: Vec::new(),
+            labels,
+            halved: !content.triangles.is_empty(),
+            vertices: Some(content.points.len()),
+        },
+    })
 }
 
-/// A triangulated surface; quads in the file are cut in two.
+/// A triangulated surface, from a file or generated; quads are cut in two.
 fn read_surface(part: &Part, notices: &mut Vec<String>) -> Result<TriangleMesh, Failure> {
-    let Part::File {
-        name,
-        bytes,
-        parameters,
-    } = part
-    else {
-        return Err(invalid("the model's `surface` must be a file".to_string()));
+    let (name, bytes, parameters) = match part {
+        Part::File {
+            name,
+            bytes,
+            parameters,
+        } => (name, bytes, parameters),
+        Part::Generated { generator, parameters } => {
+            let generated = surface::generate_surface(generator, parameters)
+                .map_err(|reason| invalid(format!("generator \"{generator}\" of the surface: {reason}")))?;
+            return Ok(TriangleMesh {
+                points: generated.mesh.points,
+                cells: halves(&generated.mesh.quads).collect(),
+            });
+        }
     };
     let content = format::read(name, bytes).map_err(|error| invalid(error.to_string()))?;
     notices.extend(content.notices.iter().map(|notice| format!("{name}: {notice}")));
     let scale = parameters.get("scale").and_then(Value::as_f64).unwrap_or(1.0);
     let mut cells = content.triangles;
-    cells.extend(content.quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]));
+    cells.extend(halves(&content.quads));
     let surface = TriangleMesh {
         points: content
             .points
@@ -186,4 +296,9 @@ fn read_surface(part: &Part, notices: &mut Vec<String>) -> Result<TriangleMesh, 
         notices.push(format!("{name}: {}", problem.message));
     }
     Ok(surface)
+}
+
+/// Every quad as two triangles.
+fn halves(quads: &[[u32; 4]]) -> impl Iterator<Item = [u32; 3]> {
+    quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]])
 }

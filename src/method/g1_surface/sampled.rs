@@ -1,11 +1,14 @@
-//! A triangulated surface on which the vertices of a quadrilateral mesh lie: nearest points, normals, and quads by rays.
+//! A triangulated surface on which the vertices of a quadrilateral mesh lie: nearest points, normals, and quads by
+//! rays or by dual contouring.
 
 use crate::geometry::closest_point::ClosestPoint;
+use crate::geometry::dual_contouring::dual_contour;
 use crate::geometry::ray::Rays;
 use crate::linalg::vector3::{add, cross, dot, subtract, times};
 use crate::mesh::generate::surface::cubed_sphere;
 use crate::mesh::quadrilateral::{Connectivity, QuadrilateralMesh};
 use crate::mesh::{TriangleMesh, area_vector, length};
+use rayon::prelude::*;
 use std::sync::Arc;
 
 /// See the module.
@@ -63,11 +66,11 @@ impl Sampled {
     }
 
     /// The subdivided cube shot along rays from the centre of the surface's box onto the last triangle that each hits, then
-    /// smoothed: every vertex moves halfway to the mean of its neighbours and back onto the surface, `smoothing` times.
+    /// [smoothed](Self::smoothed).
     ///
     /// # Errors
     /// Where a ray hits nothing.
-    pub fn quads(&self, cells: usize, smoothing: usize) -> Result<QuadrilateralMesh, String> {
+    pub fn by_rays(&self, cells: usize, smoothing: usize) -> Result<QuadrilateralMesh, String> {
         let (directions, quads) = cubed_sphere::directions(cells);
         let Some([low, high]) = crate::mesh::bounding_box(&self.surface.points) else {
             return Err("the surface has no points".to_string());
@@ -85,16 +88,33 @@ impl Sampled {
             };
             points.push(add(centre, times(direction, hit.distance)));
         }
-        let mut mesh = QuadrilateralMesh {
-            points,
-            quads,
-            normals: None,
-        };
-        let connectivity = Connectivity::of(&mesh.quads, mesh.points.len())
-            .map_err(|_| "the subdivided cube is no surface".to_string())?;
-        for _ in 0..smoothing {
-            let before = mesh.points.clone();
-            for vertex in 0..before.len() {
+        self.smoothed(points, quads, smoothing)
+    }
+
+    /// Quads around the surface by dual contouring of its signed distance, `cells` cubes along the longest side of its box,
+    /// moved onto it and [smoothed](Self::smoothed).
+    ///
+    /// # Errors
+    /// Where the surface is open, or too thin for the cubes.
+    pub fn by_dual_contouring(&self, cells: usize, smoothing: usize) -> Result<QuadrilateralMesh, String> {
+        let project = |point| self.project(point);
+        let (points, quads) = dual_contour(&self.surface, &self.nearest, &project, cells)?;
+        self.smoothed(points, quads, smoothing)
+    }
+
+    /// Every vertex moves halfway to the mean of its neighbours and back onto the surface, `rounds` times, in the end onto
+    /// the surface in any case. Normals are those of the surface.
+    fn smoothed(
+        &self,
+        mut points: Vec<[f64; 3]>,
+        quads: Vec<[u32; 4]>,
+        rounds: usize,
+    ) -> Result<QuadrilateralMesh, String> {
+        let connectivity = Connectivity::of(&quads, points.len())
+            .map_err(|defects| format!("the quadrilaterals form no surface: {defects:?}; use more or fewer cells"))?;
+        for _ in 0..rounds {
+            let before = points.clone();
+            points.par_iter_mut().enumerate().for_each(|(vertex, point)| {
                 let mut sum = [0.0; 3];
                 let mut count = 0.0;
                 for edge in connectivity.spokes(vertex) {
@@ -102,11 +122,15 @@ impl Sampled {
                     count += 1.0;
                 }
                 let target = times(add(before[vertex], times(sum, 1.0 / count)), 0.5);
-                mesh.points[vertex] = self.project(target).0;
-            }
+                *point = self.project(target).0;
+            });
         }
-        mesh.normals = Some(mesh.points.iter().map(|&point| self.project(point).1).collect());
-        Ok(mesh)
+        let on: Vec<([f64; 3], [f64; 3])> = points.par_iter().map(|&point| self.project(point)).collect();
+        Ok(QuadrilateralMesh {
+            points: on.iter().map(|(point, _)| *point).collect(),
+            quads,
+            normals: Some(on.into_iter().map(|(_, normal)| normal).collect()),
+        })
     }
 }
 

@@ -58,6 +58,32 @@ pub static FIELDS: &[Field] = &[
         doc: "Where the normals at the vertices come from.",
     },
     Field {
+        name: "creases",
+        kind: Kind::Choice(&[
+            (
+                "keep",
+                "patches meet continuously at creases, with a normal on either side, and with common tangent planes elsewhere",
+            ),
+            ("smooth", "creases are passed over: one normal a vertex"),
+        ]),
+        default: Default::Text("keep"),
+        doc: "What to do with edges that the generator, the model's `creases`, `crease_field` or `crease_angle` call sharp.",
+    },
+    Field {
+        name: "crease_angle",
+        kind: Kind::Number { min: 0.0, max: 180.0 },
+        default: Default::Absent,
+        doc: "Edges are sharp where the planes of their quadrilaterals meet at more than this angle, in degrees; absent: the \
+              angle decides nothing.",
+    },
+    Field {
+        name: "crease_field",
+        kind: Kind::Text,
+        default: Default::Absent,
+        doc: "Name of a cell field of the mesh's file, such as `reference`: edges between quadrilaterals with different values \
+              are sharp.",
+    },
+    Field {
         name: "tangents",
         kind: Kind::Choice(&[
             (
@@ -163,6 +189,22 @@ pub static FIELDS: &[Field] = &[
         doc: "What the result's mesh holds.",
     },
     Field {
+        name: "export",
+        kind: Kind::List(&Kind::Choice(&[
+            (
+                "bezier",
+                "`bezier.vtu`: a Bezier quadrilateral of order 4 a patch, and `bezier-hexahedra.vtu` where there are hexahedra",
+            ),
+            ("obj", "`tessellation.obj`: the tessellation with normals"),
+            (
+                "control-points",
+                "`control-points.txt`: the Bezier control points as text that reads back to the same bits",
+            ),
+        ])),
+        default: Default::Absent,
+        doc: "Further files beside the result's mesh.",
+    },
+    Field {
         name: "tessellation",
         kind: Kind::Integer { min: 1, max: 64 },
         default: Default::Absent,
@@ -256,6 +298,11 @@ pub enum Patches {
 pub struct Settings {
     pub geometry: Geometry,
     pub vertex_normals: VertexNormals,
+    pub creases: String,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub crease_angle: Option<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub crease_field: Option<String>,
     pub tangents: Tangents,
     pub tangent_stiffness: f64,
     pub repair: bool,
@@ -266,6 +313,8 @@ pub struct Settings {
     pub reference: String,
     pub operator: String,
     pub result: String,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub export: Vec<String>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tessellation: Option<u64>,
     pub stripes: f64,
@@ -298,10 +347,24 @@ impl Settings {
             table.entry(*name).or_insert_with(|| Value::from(chosen));
         }
         table.entry("repair").or_insert(Value::from(!paper));
-        serde_json::from_value(Value::Object(table)).map_err(|error| Failure {
+        let mut settings: Settings = serde_json::from_value(Value::Object(table)).map_err(|error| Failure {
             kind: "invalid-input".to_string(),
             reason: format!("settings of g1-surface: {error}"),
-        })
+        })?;
+        // Their order does not matter.
+        settings.export.sort();
+        settings.export.dedup();
+        Ok(settings)
+    }
+
+    /// Whether sharp edges stay sharp.
+    pub fn keeps_creases(&self) -> bool {
+        self.creases == "keep"
+    }
+
+    /// Whether a further file is asked for.
+    pub fn exports(&self, name: &str) -> bool {
+        self.export.iter().any(|export| export == name)
     }
 
     pub fn solve(&self) -> Solve {
@@ -352,6 +415,9 @@ impl Settings {
                 table.remove(*name);
             }
         };
+        if !self.keeps_creases() {
+            drop(&["crease_angle", "crease_field"]);
+        }
         if self.geometry != Geometry::G1 {
             drop(&[
                 "tangents",
@@ -370,7 +436,7 @@ impl Settings {
         if self.shell().is_none() {
             drop(&["sphere_ratio", "layers"]);
         }
-        if self.result == "control-points" {
+        if self.result == "control-points" && !self.exports("obj") {
             drop(&["tessellation", "stripes"]);
         }
         if self.tangents == Tangents::Balanced {

@@ -2,7 +2,7 @@
 
 use crate::linalg::sparse::Graph;
 use crate::mesh::connectivity::{self, CROWDED, NONE};
-use crate::mesh::{TriangleMesh, dot, length, subtract};
+use crate::mesh::{TriangleMesh, area_vector, dot, length, subtract};
 use crate::method::Failure;
 
 /// Where a vertex stands.
@@ -156,6 +156,14 @@ impl<'a> Domain<'a> {
             )));
         }
         Ok(())
+    }
+
+    /// Area of the domain's triangles.
+    pub fn area(&self) -> f64 {
+        let inside = self.mesh.cells.iter().zip(&self.inside).filter(|(_, inside)| **inside);
+        inside
+            .map(|(&cell, _)| length(area_vector(self.mesh.corners(cell))) / 2.0)
+            .sum()
     }
 
     /// How many vertices stand at a place.

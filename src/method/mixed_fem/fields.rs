@@ -40,7 +40,7 @@ pub static FIELDS: &[Field] = &[
         kind: Kind::Choice(&[
             (
                 "stabilised",
-                "system (15) with relaxed boundary rows: converges as h^2 on every family tried",
+                "system (15) with relaxed boundary rows: the most accurate on every family tried",
             ),
             (
                 "first-order-ring",
@@ -56,10 +56,25 @@ pub static FIELDS: &[Field] = &[
         doc: "How the triharmonic equation takes curve conditions.",
     },
     Field {
+        name: "relaxation",
+        kind: Kind::Choice(&[
+            (
+                "linear",
+                "c h s / 20 D with the side s of a square of the domain's area: keeps its rate on finer meshes",
+            ),
+            (
+                "quadratic",
+                "c h^2 D: a little more accurate on coarse meshes; on irregular ones the error levels off",
+            ),
+        ]),
+        default: Default::Text("linear"),
+        doc: "How much the boundary rows of the stabilised system give way: h is the mean edge length, D the lumped mass.",
+    },
+    Field {
         name: "stabilisation",
         kind: Kind::Number { min: 1e-12, max: 1e12 },
         default: Default::Number(1.0),
-        doc: "Factor c of the relaxation c h^2 D of the boundary rows; 1 to 3 is its plateau.",
+        doc: "Factor c of the relaxation; 1 to 3 is its plateau.",
     },
     Field {
         name: "mass",
@@ -77,13 +92,10 @@ pub static FIELDS: &[Field] = &[
     Field {
         name: "system",
         kind: Kind::Choice(&[
-            (
-                "auto",
-                "one-field where the mass is lumped and the system is not singular by design",
-            ),
+            ("auto", "one-field with solver = \"cholesky\", otherwise mixed"),
             (
                 "one-field",
-                "the other fields are eliminated: positive definite, fewer unknowns, less sparse",
+                "the other fields are eliminated: positive definite, fewer unknowns, less sparse; lumped masses only",
             ),
             ("mixed", "all fields at once: symmetric and indefinite"),
         ]),
@@ -95,9 +107,13 @@ pub static FIELDS: &[Field] = &[
         kind: Kind::Choice(&[
             (
                 "auto",
-                "cholesky for one-field systems, lblt for mixed ones and lu where that breaks down",
+                "cholesky for one-field systems; ldlt for mixed ones, lblt where that breaks down, then lu",
             ),
             ("cholesky", "multifrontal, nested dissection; one-field systems only"),
+            (
+                "ldlt",
+                "multifrontal, pivots of known signs, nested dissection; mixed systems only, not for curve = \"unstabilised\"",
+            ),
             (
                 "lblt",
                 "Bunch-Kaufman pivots within supernodes, nested dissection; mixed systems only",

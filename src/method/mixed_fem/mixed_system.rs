@@ -7,7 +7,7 @@ use super::scheme::{Discretization, Mass};
 use crate::linalg::sparse::{Elimination, Graph, geometric_dissection};
 
 /// No unknown.
-const NONE: u32 = u32::MAX;
+pub(super) const NONE: u32 = u32::MAX;
 
 /// A symmetric matrix: its lower triangle by columns, rows ascending, the diagonal first.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -52,6 +52,24 @@ impl LowerMatrix {
         }
         sums.into_iter().fold(0.0, f64::max)
     }
+
+    /// The number of singular values below 1e-10 of the largest; `None` for more than 600 unknowns, which would take too long.
+    pub fn nullity(&self) -> Option<usize> {
+        let dimension = self.dimension();
+        if dimension > 600 {
+            return None;
+        }
+        let mut dense = faer::Mat::<f64>::zeros(dimension, dimension);
+        for column in 0..dimension {
+            for place in self.offsets[column]..self.offsets[column + 1] {
+                dense[(self.rows[place], column)] = self.values[place];
+                dense[(column, self.rows[place])] = self.values[place];
+            }
+        }
+        let values = dense.singular_values().ok()?;
+        let largest = values.iter().copied().fold(0.0, f64::max);
+        Some(values.iter().filter(|&&value| value < 1e-10 * largest).count())
+    }
 }
 
 /// The unknowns of the mixed system.
@@ -63,7 +81,7 @@ pub struct Numbering {
     pub count: usize,
     /// An unknown is its field's value divided by this, so that all coefficients have about the same size whatever the
     /// edge length: pivots are chosen by size.
-    scale: [f64; 3],
+    pub(super) scale: [f64; 3],
 }
 
 /// The fields in the order in which a vertex's unknowns are numbered: `v`, `w`, `u`. In this order every pivot is nonzero once
@@ -72,24 +90,11 @@ const FIELDS: [usize; 3] = [1, 2, 0];
 
 impl Numbering {
     pub fn new(discretization: &Discretization<'_>) -> Self {
-        let domain = discretization.domain;
         let unknown = &discretization.unknown;
-        let vertices = domain.places.len();
-        let mut name = vec![NONE; vertices];
-        let mut with: Vec<u32> = Vec::new();
-        for vertex in 0..vertices {
-            if unknown.iter().any(|field| field[vertex]) {
-                name[vertex] = with.len() as u32;
-                with.push(vertex as u32);
-            }
-        }
-        let graph = Graph::of_cells(with.len(), &domain.mesh.cells, |vertex| {
-            Some(name[vertex as usize]).filter(|&index| index != NONE)
-        });
-        let points: Vec<[f64; 3]> = with.iter().map(|&vertex| domain.mesh.points[vertex as usize]).collect();
+        let (with, graph, points) = vertex_graph(discretization);
         let elimination = Elimination::new(&graph, &geometric_dissection(&graph, &points), discretization.order);
         let order: Vec<u32> = elimination.order().iter().map(|&place| with[place as usize]).collect();
-        let mut index = vec![[NONE; 3]; vertices];
+        let mut index = vec![[NONE; 3]; discretization.domain.places.len()];
         let mut count = 0;
         for &vertex in &order {
             for field in FIELDS {
@@ -105,6 +110,31 @@ impl Numbering {
             count: count as usize,
             scale: scale(discretization),
         }
+    }
+
+    /// The same number of places, one for each field, at each of the vertices `with`, whether the field is unknown or not; the
+    /// vertices in the given order, the fields in that of [`FIELDS`].
+    pub(super) fn in_blocks(discretization: &Discretization<'_>, with: &[u32]) -> Self {
+        let fields = FIELDS.into_iter().filter(|&field| field < discretization.order);
+        let mut index = vec![[NONE; 3]; discretization.domain.places.len()];
+        for (place, &vertex) in with.iter().enumerate() {
+            for (slot, field) in fields.clone().enumerate() {
+                if discretization.unknown[field][vertex as usize] {
+                    index[vertex as usize][field] = (place * discretization.order + slot) as u32;
+                }
+            }
+        }
+        Self {
+            index,
+            order: with.to_vec(),
+            count: with.len() * discretization.order,
+            scale: scale(discretization),
+        }
+    }
+
+    /// Numbers of the unknowns `u`, `v`, `w` at a vertex, [`NONE`] where the field is known.
+    pub(super) fn unknowns(&self, vertex: u32) -> [u32; 3] {
+        self.index[vertex as usize]
     }
 
     /// The values of a field taken from a solution with `components` columns; known values elsewhere.
@@ -123,6 +153,34 @@ impl Numbering {
     }
 }
 
+/// The vertices with an unknown, the mesh's edges between them by their places in that list, and where they are.
+pub(super) fn vertex_graph(discretization: &Discretization<'_>) -> (Vec<u32>, Graph, Vec<[f64; 3]>) {
+    let mesh = discretization.domain.mesh;
+    let vertices = discretization.domain.places.len();
+    let mut name = vec![NONE; vertices];
+    let mut with: Vec<u32> = Vec::new();
+    for vertex in 0..vertices {
+        if discretization.unknown.iter().any(|field| field[vertex]) {
+            name[vertex] = with.len() as u32;
+            with.push(vertex as u32);
+        }
+    }
+    let whole = &discretization.domain.graph;
+    let mut graph = Graph {
+        offsets: Vec::with_capacity(with.len() + 1),
+        neighbours: Vec::with_capacity(whole.neighbours.len()),
+    };
+    graph.offsets.push(0);
+    for &vertex in &with {
+        // Names ascend with the vertices, so the neighbours stay sorted.
+        let names = whole.neighbours(vertex).iter().map(|&other| name[other as usize]);
+        graph.neighbours.extend(names.filter(|&name| name != NONE));
+        graph.offsets.push(graph.neighbours.len());
+    }
+    let points = with.iter().map(|&vertex| mesh.points[vertex as usize]).collect();
+    (with, graph, points)
+}
+
 /// With the mean lumped mass `m`, coefficients are of size 1 for `L`, `m` for `M` and `m^2` for `S`.
 fn scale(discretization: &Discretization<'_>) -> [f64; 3] {
     let lumped = discretization.lumped();
@@ -138,7 +196,11 @@ fn scale(discretization: &Discretization<'_>) -> [f64; 3] {
 
 /// Calls `visit(row field, column vertex, column field, coefficient)` for every coefficient in the rows of the
 /// unknowns of one vertex.
-fn coefficients(discretization: &Discretization<'_>, vertex: u32, mut visit: impl FnMut(usize, usize, usize, f64)) {
+pub(super) fn coefficients(
+    discretization: &Discretization<'_>,
+    vertex: u32,
+    mut visit: impl FnMut(usize, usize, usize, f64),
+) {
     let operators = discretization.operators;
     let lumped = (discretization.mass != Mass::Full).then(|| discretization.lumped());
     let (u, v, w) = (0, 1, 2);

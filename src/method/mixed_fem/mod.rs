@@ -9,12 +9,15 @@
 //! Guaranteed: the relative residual of every reported solution is below 1e-9; the same input gives the same bits with any
 //! number of threads. Not guaranteed: convergence of the paper's triharmonic systems on irregular meshes.
 
+mod block_factor;
 pub mod domain;
 pub mod factorization;
 pub mod fields;
 pub mod function;
 pub mod handles;
 pub mod hole;
+mod lblt;
+mod lu;
 pub mod metrics;
 pub mod mixed_system;
 pub mod model;
@@ -23,6 +26,7 @@ pub mod planar_data;
 pub mod scheme;
 pub mod seam;
 pub mod settings;
+pub mod signed_system;
 pub mod singular;
 pub mod study;
 pub mod surface_data;
@@ -46,7 +50,7 @@ impl Method for MixedFem {
     }
 
     fn version(&self) -> u32 {
-        1
+        2
     }
 
     fn summary(&self) -> &'static str {

@@ -4,8 +4,7 @@
 //! `(P^T (-L) P + C^T S^-1 C) u = ...` with `P = D^-1 B` and `C = L` from the unknown `u` to the relaxed boundary rows.
 
 use super::scheme::Discretization;
-use crate::linalg::sparse::{BlockPattern, FIXED, geometric_dissection};
-use crate::method::Failure;
+use crate::linalg::sparse::{BlockPattern, FIXED, Graph, geometric_dissection};
 use crate::optimize::Observer;
 
 /// A one-field system: structure and matrix.
@@ -80,10 +79,7 @@ impl Accumulator {
 
 impl OneField {
     /// Assembles the matrix. The mass must be lumped.
-    ///
-    /// # Errors
-    /// When the structure is too large to be numbered.
-    pub fn new(discretization: &Discretization<'_>, observer: &mut dyn Observer) -> Result<Self, Failure> {
+    pub fn new(discretization: &Discretization<'_>, observer: &mut dyn Observer) -> Self {
         observer.phase("assemble");
         let domain = discretization.domain;
         let pattern = &discretization.operators.pattern;
@@ -127,7 +123,7 @@ impl OneField {
             image.offsets.push(image.columns.len());
         }
         let mut edges: Vec<[u32; 2]> = Vec::new();
-        let mut parts: Vec<f64> = Vec::new();
+        let mut entries: Vec<f64> = Vec::new();
         let mut diagonal = vec![0.0; free.len()];
         for (row, &vertex) in free.iter().enumerate() {
             for place in pattern.row(vertex) {
@@ -155,25 +151,28 @@ impl OneField {
                     diagonal[row] = value;
                 } else {
                     edges.push([row as u32, column]);
-                    parts.extend([0.0, value, 0.0]);
+                    entries.push(value);
                 }
             });
         }
         let points: Vec<[f64; 3]> = free.iter().map(|&vertex| domain.mesh.points[vertex as usize]).collect();
         observer.phase("order");
-        let all = vec![true; points.len()];
-        let pattern =
-            BlockPattern::<1>::with_order(&points, &edges, &all, geometric_dissection).map_err(|error| Failure {
-                kind: "invalid-input".to_string(),
-                reason: format!("the one-field system cannot be set up: {error}"),
-            })?;
+        let graph = Graph::of_cells(points.len(), &edges, Some);
+        let pattern = BlockPattern::<1>::of_graph(&graph, &geometric_dissection(&graph, &points));
         observer.phase("assemble");
         let mut values = vec![0.0; pattern.values_len()];
-        pattern.assemble(&parts, &mut values);
-        for (vertex, &entry) in diagonal.iter().enumerate() {
-            pattern.add_to_diagonal(&mut values, vertex, entry);
+        let mut set = |row: usize, column: usize, value: f64| {
+            if let Some((place, _)) = pattern.block(row, column) {
+                values[place] = value;
+            }
+        };
+        for (vertex, &value) in diagonal.iter().enumerate() {
+            set(vertex, vertex, value);
         }
-        Ok(Self { pattern, values })
+        for (&[row, column], &value) in edges.iter().zip(&entries) {
+            set(row as usize, column as usize, value);
+        }
+        Self { pattern, values }
     }
 }
 

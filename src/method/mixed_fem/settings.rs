@@ -1,7 +1,7 @@
 //! The settings of a mixed finite element computation in the typed form that it reads.
 
 use super::fields::FIELDS;
-use super::scheme::{Mass, Scheme};
+use super::scheme::{Mass, Relaxation, Scheme};
 use crate::method::Failure;
 use crate::method::setting::fill;
 use serde::{Deserialize, Serialize};
@@ -43,6 +43,7 @@ pub enum System {
 pub enum Solver {
     Auto,
     Cholesky,
+    Ldlt,
     Lblt,
     Lu,
 }
@@ -130,6 +131,7 @@ pub struct Settings {
     pub equation: Equation,
     pub condition: Condition,
     pub curve: Curve,
+    pub relaxation: Relaxation,
     pub stabilisation: f64,
     pub mass: Mass,
     pub system: System,
@@ -188,7 +190,7 @@ impl Settings {
         match self.system {
             System::OneField => true,
             System::Mixed => false,
-            System::Auto => self.has_one_field() && matches!(self.solver, Solver::Auto | Solver::Cholesky),
+            System::Auto => self.has_one_field() && self.solver == Solver::Cholesky,
         }
     }
 
@@ -207,7 +209,7 @@ impl Settings {
             drop(&["curve"]);
         }
         if scheme != Scheme::Stabilised {
-            drop(&["stabilisation"]);
+            drop(&["relaxation", "stabilisation"]);
         }
         if scheme != Scheme::Unstabilised {
             drop(&["on_singular"]);
@@ -255,7 +257,7 @@ pub fn check(settings: &Value) -> Vec<(String, String)> {
         );
     }
     let one_field = settings.one_field();
-    if one_field && matches!(settings.solver, Solver::Lblt | Solver::Lu) {
+    if one_field && matches!(settings.solver, Solver::Ldlt | Solver::Lblt | Solver::Lu) {
         error(
             "solver",
             "the one-field system is positive definite: use \"cholesky\" or system = \"mixed\"".into(),
@@ -264,7 +266,7 @@ pub fn check(settings: &Value) -> Vec<(String, String)> {
     if !one_field && settings.solver == Solver::Cholesky {
         error(
             "solver",
-            "the mixed system is indefinite: use \"lblt\" or \"lu\", or system = \"one-field\"".into(),
+            "the mixed system is indefinite: use \"ldlt\", \"lblt\" or \"lu\", or system = \"one-field\"".into(),
         );
     }
     for (index, handle) in settings.handles.iter().flatten().enumerate() {

@@ -216,13 +216,15 @@ fn solve(
     } else {
         vec![true; domain.mesh.cells.len()]
     };
-    let operators = SurfaceOperators::new(domain.mesh, &selected).map_err(|error| invalid(format!("mesh: {error}")))?;
+    let operators = SurfaceOperators::on_graph(domain.mesh, &domain.graph, &selected)
+        .map_err(|error| invalid(format!("mesh: {error}")))?;
     let discretization = Discretization::new(
         domain,
         &operators,
         scheme,
         settings.order(),
         settings.mass,
+        settings.relaxation,
         settings.stabilisation,
         data,
     )?;

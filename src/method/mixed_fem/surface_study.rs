@@ -48,7 +48,8 @@ pub(super) fn run(mut model: Model, settings: &Settings, observer: &mut dyn Obse
     } else {
         vec![true; mesh.cells.len()]
     };
-    let operators = SurfaceOperators::new(mesh, &selected).map_err(|error| invalid(format!("mesh: {error}")))?;
+    let operators = SurfaceOperators::on_graph(mesh, &domain.graph, &selected)
+        .map_err(|error| invalid(format!("mesh: {error}")))?;
     let sides = Sides::new(&domain);
     let rest = model.targets.as_ref().unwrap_or(&mesh.points);
     let mut system: Option<System> = None;
@@ -88,6 +89,7 @@ pub(super) fn run(mut model: Model, settings: &Settings, observer: &mut dyn Obse
             scheme,
             order,
             settings.mass,
+            settings.relaxation,
             settings.stabilisation,
             &data,
         )?;

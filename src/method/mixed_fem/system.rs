@@ -1,10 +1,11 @@
 //! A factorized system, one-field or mixed, that turns conditions into solutions.
 
-use super::factorization::{Factorization, analyse, nullity};
+use super::factorization::{Factorization, singular};
 use super::mixed_system::{self, Numbering};
 use super::one_field::{self, OneField};
 use super::scheme::Discretization;
 use super::settings::Solver;
+use super::signed_system::SignedSystem;
 use crate::method::Failure;
 use crate::optimize::Observer;
 
@@ -17,8 +18,8 @@ pub struct System {
     factorization: Factorization,
     pub factorizations: u64,
     pub fallbacks: u64,
-    /// Whether a breakdown may still be answered with LU.
-    may_fall_back: bool,
+    /// The factorization that answers a breakdown.
+    next: Option<Solver>,
 }
 
 enum Form {
@@ -44,7 +45,7 @@ impl System {
         observer: &mut dyn Observer,
     ) -> Result<Self, Failure> {
         if one_field {
-            let system = OneField::new(discretization, observer)?;
+            let system = OneField::new(discretization, observer);
             let free: Vec<u32> = (0..discretization.unknown[0].len() as u32)
                 .filter(|&vertex| discretization.unknown[0][vertex as usize])
                 .collect();
@@ -54,28 +55,38 @@ impl System {
                 factorization: Factorization::cholesky(system, &free)?,
                 factorizations: 1,
                 fallbacks: 0,
-                may_fall_back: false,
+                next: None,
             });
         }
-        observer.phase("order");
-        let numbering = Numbering::new(discretization);
-        observer.phase("assemble");
-        let matrix = mixed_system::matrix(discretization, &numbering);
-        let factorization = if solver == Solver::Lu {
+        let mut fallbacks = 0;
+        if matches!(solver, Solver::Auto | Solver::Ldlt) {
+            observer.phase("order");
+            let (system, numbering) = SignedSystem::new(discretization);
             observer.phase("factorize");
-            Factorization::lu(matrix)?
-        } else {
-            observer.phase("analyse");
-            let analysis = analyse(&matrix)?;
-            observer.phase("factorize");
-            Factorization::lblt(matrix, analysis)?
-        };
+            if let Some(factorization) = Factorization::ldlt(system) {
+                return Ok(Self {
+                    form: Form::Mixed(numbering),
+                    factorization,
+                    factorizations: 1,
+                    fallbacks,
+                    next: (solver == Solver::Auto).then_some(Solver::Lblt),
+                });
+            }
+            if solver == Solver::Ldlt {
+                return Err(singular(
+                    "a pivot has not the sign that it should have; use solver = \"lblt\" or \"auto\"".to_string(),
+                ));
+            }
+            fallbacks += 1;
+        }
+        let pivoted = if solver == Solver::Auto { Solver::Lblt } else { solver };
+        let (form, factorization) = pivoting(discretization, pivoted, observer)?;
         Ok(Self {
-            form: Form::Mixed(numbering),
+            form,
             factorization,
-            factorizations: 1,
-            fallbacks: 0,
-            may_fall_back: solver == Solver::Auto,
+            factorizations: 1 + fallbacks,
+            fallbacks,
+            next: (solver == Solver::Auto).then_some(Solver::Lu),
         })
     }
 
@@ -89,20 +100,15 @@ impl System {
         observer: &mut dyn Observer,
     ) -> Result<Solution, Failure> {
         observer.phase("solve");
-        let wanted = self.right_side(discretization);
-        let mut x = wanted.clone();
+        let mut x = self.right_side(discretization);
         let mut residual = self.factorization.solve(&mut x, discretization.components)?;
-        if !(residual < BROKEN) && self.may_fall_back {
-            observer.phase("factorize");
-            self.may_fall_back = false;
+        while let Some(next) = self.next.take_if(|_| !(residual < BROKEN)) {
+            (self.form, self.factorization) = pivoting(discretization, next, observer)?;
             self.factorizations += 1;
             self.fallbacks += 1;
-            let Form::Mixed(numbering) = &self.form else {
-                return Err(broken(residual));
-            };
-            self.factorization = Factorization::lu(mixed_system::matrix(discretization, numbering))?;
+            self.next = (next == Solver::Lblt).then_some(Solver::Lu);
             observer.phase("solve");
-            x = wanted;
+            x = self.right_side(discretization);
             residual = self.factorization.solve(&mut x, discretization.components)?;
         }
         if !(residual < BROKEN) {
@@ -122,7 +128,7 @@ impl System {
         }
     }
 
-    /// `cholesky`, `lblt` or `lu`.
+    /// `cholesky`, `ldlt`, `lblt` or `lu`.
     pub fn solver(&self) -> &'static str {
         self.factorization.name()
     }
@@ -141,6 +147,26 @@ impl System {
     }
 }
 
+/// Assembles the mixed system and factorizes it with pivoting, by `lu` if the solver is that, else by `lblt`.
+fn pivoting(
+    discretization: &Discretization<'_>,
+    solver: Solver,
+    observer: &mut dyn Observer,
+) -> Result<(Form, Factorization), Failure> {
+    observer.phase("order");
+    let numbering = Numbering::new(discretization);
+    observer.phase("assemble");
+    let matrix = mixed_system::matrix(discretization, &numbering);
+    let factorization = if solver == Solver::Lu {
+        observer.phase("factorize");
+        Factorization::lu(matrix)?
+    } else {
+        observer.phase("analyse");
+        Factorization::lblt(matrix, || observer.phase("factorize"))?
+    };
+    Ok((Form::Mixed(numbering), factorization))
+}
+
 fn broken(residual: f64) -> Failure {
     Failure {
         kind: "singular".to_string(),
@@ -156,6 +182,6 @@ pub fn mixed_nullity(discretization: &Discretization<'_>) -> Option<usize> {
     let numbering = Numbering::new(discretization);
     // The singular values of a large matrix take too long.
     (numbering.count <= 600)
-        .then(|| nullity(&mixed_system::matrix(discretization, &numbering)))
+        .then(|| mixed_system::matrix(discretization, &numbering).nullity())
         .flatten()
 }

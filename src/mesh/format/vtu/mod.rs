@@ -5,10 +5,12 @@
 //! that the file is valid XML, every number keeps its bits, and the same content gives the same bytes.
 //! Source: the VTK user's guide, 11th edition, section 19.3, "XML file formats".
 
+mod bezier;
 pub mod curved;
 mod file;
 mod write;
 
+pub use bezier::{hexahedron_order, quadrilateral_order, write_bezier_hexahedra, write_bezier_quadrilaterals};
 pub(super) use write::write_content;
 pub use write::{FieldView, write};
 

@@ -26,6 +26,15 @@ pub enum Analytic {
     Star { axes: [f64; 3], bumps: Vec<Bump> },
     /// The graph `z = height (x^2 - y^2 + x y^2)`, an open surface.
     Saddle { height: f64 },
+    /// `sum weights (x - centre)^2 + linear . x = constant`: a plane, a sphere, a cylinder.
+    Quadric {
+        weights: [f64; 3],
+        centre: [f64; 3],
+        linear: [f64; 3],
+        constant: f64,
+    },
+    /// The graph `z = -bowl (x^2 + y^2) - height side x max(y, 0)^3`: one side of a crease that fades out.
+    Ridge { height: f64, bowl: f64, side: f64 },
 }
 
 /// The level function of an [`Analytic`] surface and its derivatives at a point.
@@ -61,6 +70,23 @@ impl Analytic {
                     allowed = allowed + (along / radius - one).scale(bump.sharpness).exp().scale(bump.height);
                 }
                 radius - allowed
+            }
+            Analytic::Quadric {
+                weights,
+                centre,
+                linear,
+                constant,
+            } => {
+                let mut sum = S::constant(-constant);
+                for axis in 0..3 {
+                    let away = x[axis] - S::constant(centre[axis]);
+                    sum = sum + away.square().scale(weights[axis]) + x[axis].scale(linear[axis]);
+                }
+                sum
+            }
+            Analytic::Ridge { height, bowl, side } => {
+                let rise = x[1].where_negative(S::constant(0.0), x[1] * x[1].square());
+                x[2] + (x[0].square() + x[1].square()).scale(*bowl) + (x[0] * rise).scale(height * side)
             }
             Analytic::Saddle { height } => x[2] - (x[0].square() - x[1].square() + x[0] * x[1].square()).scale(*height),
         }

@@ -49,7 +49,7 @@ pub(super) const HEAD: SurfaceGenerator = SurfaceGenerator {
 };
 
 /// The faces of the cube `[-1, 1]^3`, outward.
-const FACES: [[u32; 4]; 6] = [
+pub(super) const FACES: [[u32; 4]; 6] = [
     [0, 2, 3, 1],
     [4, 5, 7, 6],
     [0, 1, 5, 4],

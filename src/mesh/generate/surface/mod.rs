@@ -1,6 +1,8 @@
-//! Generators of quadrilateral surfaces whose vertices and normals lie on a surface given by a formula.
+//! Generators of quadrilateral surfaces whose vertices and normals lie on a surface given by a formula, or on several that
+//! meet in creases.
 
 pub mod analytic;
+pub mod creased;
 pub mod cubed_sphere;
 pub mod icosahedron;
 pub mod poles;
@@ -18,8 +20,20 @@ use serde_json::Value;
 pub struct GeneratedSurface {
     /// With a unit normal for every point.
     pub mesh: QuadrilateralMesh,
-    /// The surface on which the points lie, where there is a formula for it.
+    /// The surface on which the points lie, where there is one formula for it.
     pub exact: Option<Analytic>,
+    /// What is known of its creases, where it has some.
+    pub creased: Option<Creased>,
+}
+
+/// Creases of a generated surface and the smooth pieces between them.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Creased {
+    /// Edges between pieces, smaller vertex first.
+    pub sharp: Vec<[u32; 2]>,
+    pub pieces: Vec<Analytic>,
+    /// The piece of every quad.
+    pub piece_of: Vec<u32>,
 }
 
 /// A kind of surface, as named in `generate = "torus"`.
@@ -42,6 +56,9 @@ pub fn surfaces() -> &'static [SurfaceGenerator] {
         poles::GENERATOR,
         saddle::GENERATOR,
         strip::GENERATOR,
+        creased::CYLINDER,
+        creased::CUBE,
+        creased::RIDGE,
     ];
     ALL
 }
@@ -116,6 +133,7 @@ fn on(exact: Analytic, points: Vec<[f64; 3]>, quads: Vec<[u32; 4]>) -> Generated
             normals: Some(normals),
         },
         exact: Some(exact),
+        creased: None,
     }
 }
 

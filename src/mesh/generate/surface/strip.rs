@@ -28,5 +28,6 @@ fn build(arguments: &Arguments) -> Result<GeneratedSurface, String> {
             normals: Some(vec![level, level, tilted, tilted]),
         },
         exact: None,
+        creased: None,
     })
 }

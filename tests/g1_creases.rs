@@ -161,6 +161,31 @@ fn creases_come_from_angles_lists_and_labels() {
         assert_eq!(other.mesh, by_angle.mesh);
         assert_eq!(metric(other, "crease_edges"), 12.0);
     }
+    // Normals of the corners, different on both sides of every edge; one quad listed the other way round.
+    let mut corners = BOX.split_once("f ").expect("faces").0.to_string();
+    corners.push_str("vn 0 0 -2\nvn 0 0 1\nvn 0 -1 0\nvn 1 0 0\nvn 0 1 0\nvn -1 0 0\n");
+    for (normal, quad) in [
+        [4, 3, 2, 1],
+        [5, 6, 7, 8],
+        [1, 2, 6, 5],
+        [2, 3, 7, 6],
+        [7, 8, 4, 3],
+        [4, 1, 5, 8],
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let words = quad.map(|vertex: usize| format!("{vertex}//{}", normal + 1));
+        corners.push_str(&format!("f {}\n", words.join(" ")));
+    }
+    let settings = json!({ "crease_normals": true, "tessellation": 1 });
+    let named = run(&[("mesh", file("box.obj", &corners))], settings.clone()).expect("a box");
+    assert_eq!(metric(&named, "crease_edges"), 12.0);
+    assert!((metric(&named, "area") - 22.0).abs() < 1e-12 && metric(&named, "angle_max") == 0.0);
+    let without = run(&[("mesh", file("box.obj", BOX))], settings)
+        .expect_err("no normals")
+        .reason;
+    assert!(without.contains("crease_normals needs"), "{without}");
     // With one normal a vertex for all walls, their creases with the top would run on around its corners.
     let ring = "0 1\n1 2\n2 3\n3 0\n4 5\n5 6\n6 7\n7 4\n";
 

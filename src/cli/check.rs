@@ -67,9 +67,10 @@ pub fn execute(arguments: Arguments) -> Exit {
             .filter(|verdict| verdict.outcome == outcome)
             .count()
     };
+    let met = count(Outcome::Met);
     eprintln!(
-        "{} expectations met, {} failed, {} skipped",
-        count(Outcome::Met),
+        "{met} {} met, {} failed, {} skipped",
+        if met == 1 { "expectation" } else { "expectations" },
         failed.len(),
         count(Outcome::Skipped)
     );

@@ -109,6 +109,9 @@ fn syntax_errors(source: &Arc<Source>, errors: &[toml::de::Error]) -> Vec<Diagno
         let mut diagnostic = Diagnostic::error(message).label(expected).at(source, span);
         if message == "duplicate key" {
             diagnostic = diagnostic.help("a key or table may stand only once; join the two or remove one");
+        } else if message.starts_with("cannot extend value of type") {
+            diagnostic =
+                diagnostic.help("a name with a dot that is no table stands in quotes: \"model.cells\" = [...]");
         } else if ["invalid boolean", "invalid float", "string values must be quoted"].contains(&message) {
             diagnostic = diagnostic.help("text stands in quotes: \"...\"");
         }

@@ -269,7 +269,8 @@ pub static PLOT: &[Key] = &[
         "series",
         Holds::AxisNames,
         false,
-        "Axes whose values tell the series apart; those that vary, save x, when absent.",
+        "Axes whose values tell the series apart. When absent all that vary, save x and its zip; and where x is measured, such \
+         as an edge length, save the models' numbers, which refine.",
     ),
     key(
         "log",
@@ -306,7 +307,8 @@ pub static RATE: &[Key] = &[
         "series",
         Holds::AxisNames,
         false,
-        "Axes with a slope for each of their values; those that vary, save x, when absent.",
+        "Axes with a slope for each of their values. When absent all that vary, save x and its zip; and where x is measured, \
+         such as an edge length, save the models' numbers, which refine.",
     ),
     key(
         "where",

@@ -1,6 +1,6 @@
 //! Creases of a quadrilateral surface: which edges are sharp, and the surface cut open along them.
 //!
-//! [`by_angle`], [`by_label`] and [`by_list`] name sharp edges; [`cut`] gives every vertex on a crease one copy for each of the
+//! [`by_angle`], [`by_label`], [`by_corner_normals`] and [`by_list`] name sharp edges; [`cut`] gives every vertex on a crease one copy for each of the
 //! smooth sides around it. Along a crease the cut surface has a boundary on either side with equal points, so that what is
 //! built over it may have a normal a side, and [`Cut::creases`] tells which boundary edges belong together.
 //!
@@ -11,6 +11,9 @@
 use super::connectivity::NONE;
 use super::quadrilateral::{Connectivity, QuadrilateralMesh, quad_and_corner};
 use super::{cross, dot, length, subtract};
+
+/// The sine between normals of one corner and another that are written with few digits but mean the same.
+const ALIKE: f64 = 1e-3;
 
 /// A surface cut along its creases.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -49,6 +52,26 @@ pub fn by_angle(mesh: &QuadrilateralMesh, connectivity: &Connectivity, degrees: 
 /// Marks inner edges between quads with different labels.
 pub fn by_label(connectivity: &Connectivity, labels: &[f64]) -> Vec<bool> {
     marked(connectivity, |first, second| labels[first] != labels[second])
+}
+
+/// Marks inner edges whose quads have normals that differ by more than rounding at one of its ends. `normals` stand at the
+/// corners of `quads`; the quads of `connectivity` are the same, but may run the other way.
+pub fn by_corner_normals(connectivity: &Connectivity, quads: &[[u32; 4]], normals: &[[[f64; 3]; 4]]) -> Vec<bool> {
+    let at = |quad: usize, vertex: u32| {
+        let corner = quads[quad].iter().position(|&other| other == vertex);
+        corner.map(|corner| normals[quad][corner])
+    };
+    let differ = |[first, second]: [usize; 2], vertex: u32| match (at(first, vertex), at(second, vertex)) {
+        (Some(a), Some(b)) => length(cross(a, b)) > ALIKE * length(a) * length(b) || dot(a, b) < 0.0,
+        _ => false,
+    };
+    let inner = |(edge, sides): (&[u32; 2], &[u32; 2])| {
+        !sides.contains(&NONE) && {
+            let both = sides.map(|side| quad_and_corner(side).0);
+            edge.iter().any(|&vertex| differ(both, vertex))
+        }
+    };
+    connectivity.edges.iter().zip(&connectivity.sides).map(inner).collect()
 }
 
 /// Marks the listed edges; boundary edges among them stay unmarked.

@@ -205,7 +205,15 @@ impl Fit {
                 }
                 text.push_str(&format!(" over {} points", self.points.len()));
             }
-            None => text.push_str(&format!("no slope from {} points", self.points.len())),
+            None => {
+                let points = if self.points.len() == 1 { "point" } else { "points" };
+                text.push_str(&format!("no slope from {} {points}", self.points.len()));
+                if self.points.len() == 1 {
+                    text.push_str(
+                        "; say with series = [...] which axes tell lines apart, all but the one that refines",
+                    );
+                }
+            }
         }
         if let Some(last) = self.last_pair {
             text.push_str(&format!("; last pair {}", shown(last, None)));

@@ -50,7 +50,7 @@ fn table(checker: &mut Checker, node: &Node, context: &Context<'_>, names: &mut 
     let rows = match found.nodes.get("rows") {
         Some(entry) => axes::axis_names(checker, &entry.value, "rows", context.axes),
         None => {
-            let all = varying(context, None).into_iter();
+            let all = varying(context).into_iter();
             all.filter(|axis| !across.contains(axis)).collect()
         }
     };
@@ -105,7 +105,7 @@ fn indistinct(
         })
         .collect();
     if heads.len() < jobs.len() {
-        let more: Vec<String> = varying(context, None)
+        let more: Vec<String> = varying(context)
             .into_iter()
             .filter(|axis| !rows.contains(axis))
             .collect();
@@ -210,11 +210,10 @@ fn condition(checker: &mut Checker, found: &Entries<'_>, context: &Context<'_>) 
         .unwrap_or_default()
 }
 
-/// Axes that vary, save one; `model` when none does.
-fn varying(context: &Context<'_>, but: Option<&str>) -> Vec<String> {
+/// Axes that vary; the first axis when none does.
+fn varying(context: &Context<'_>) -> Vec<String> {
     let mut names = context.axes.varying();
-    names.retain(|name| Some(name.as_str()) != but);
-    if names.is_empty() && but.is_none() {
+    if names.is_empty() {
         names.extend(context.axes.names().next().map(str::to_owned));
     }
     names
@@ -223,7 +222,12 @@ fn varying(context: &Context<'_>, but: Option<&str>) -> Vec<String> {
 fn series(checker: &mut Checker, found: &Entries<'_>, context: &Context<'_>, x: Option<&str>) -> Vec<String> {
     match found.nodes.get("series") {
         Some(entry) => axes::axis_names(checker, &entry.value, "series", context.axes),
-        None => varying(context, Some(x.unwrap_or(""))),
+        None => {
+            let refining = context.axes.refining(x.unwrap_or(""));
+            let mut names = context.axes.varying();
+            names.retain(|name| !refining.contains(name));
+            names
+        }
     }
 }
 

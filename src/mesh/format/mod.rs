@@ -23,6 +23,7 @@ mod vtk;
 pub mod vtu;
 
 pub use cells::{CellKind, Cells};
+pub use obj::quad_corner_normals;
 
 use std::fmt;
 

@@ -308,6 +308,49 @@ fn read_normals(bytes: &[u8], vertices: usize) -> Result<Vec<Field>, Fault> {
     }])
 }
 
+/// The normals that the corners of an OBJ file's faces name, quad by quad; nothing when a face is no quad or a corner names no
+/// normal of the file. The file must have been [read](super::read) before.
+pub fn quad_corner_normals(bytes: &[u8]) -> Option<Vec<[[f64; 3]; 4]>> {
+    let mut text = Text::new(bytes, None);
+    let mut normals: Vec<[f64; 3]> = Vec::new();
+    let mut named: Vec<[usize; 4]> = Vec::new();
+    while let Some(line) = text.line() {
+        let line = line.split(|&byte| byte == b'#').next().unwrap_or_default();
+        let mut words = line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
+        match words.next() {
+            Some(b"vn") => {
+                let mut normal = [0.0; 3];
+                for component in &mut normal {
+                    *component = words.next().and_then(parse_real)?;
+                }
+                normals.push(normal);
+            }
+            Some(b"f") => {
+                let index = |word: &[u8]| {
+                    let number = super::text::parse_integer(word.split(|&byte| byte == b'/').nth(2)?)?;
+                    let index = if number < 0 {
+                        (normals.len() as i64).checked_add(number)?
+                    } else {
+                        number.checked_sub(1)?
+                    };
+                    usize::try_from(index).ok()
+                };
+                let corners: Option<Vec<usize>> = words.map(index).collect();
+                named.push(corners?.try_into().ok()?);
+            }
+            _ => {}
+        }
+    }
+    let quad = |corners: [usize; 4]| -> Option<[[f64; 3]; 4]> {
+        let mut found = [[0.0; 3]; 4];
+        for (place, corner) in found.iter_mut().zip(corners) {
+            *place = *normals.get(corner)?;
+        }
+        Some(found)
+    };
+    named.into_iter().map(quad).collect()
+}
+
 /// Names the first face with a corner that is none of the vertices.
 fn out_of_bounds(bytes: &[u8], vertices: usize) -> Fault {
     let mut text = Text::new(bytes, None);

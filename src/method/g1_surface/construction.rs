@@ -108,6 +108,11 @@ impl Building {
         Ok(building)
     }
 
+    fn converged(&mut self) {
+        self.stop = "converged".to_string();
+        self.reason = "the patches are built".to_string();
+    }
+
     fn set(&mut self, name: &str, value: f64) {
         self.metrics.insert(name.to_string(), value);
     }
@@ -227,7 +232,12 @@ impl Building {
         let mut fitted = fit(&self.network, &slopes);
         if settings.repair {
             let stiffness = settings.tangent_stiffness;
-            let Repaired { tries, change, notice } = repair(
+            let Repaired {
+                tries,
+                change,
+                kept,
+                notice,
+            } = repair(
                 &mut self.network,
                 &mut slopes,
                 &mut fitted,
@@ -239,6 +249,9 @@ impl Building {
             self.counters.insert("repairs".to_string(), tries);
             self.tangent_change = self.tangent_change.max(change);
             self.notices.extend(notice);
+            if kept && self.stop == "stalled" {
+                self.converged();
+            }
         }
         self.tell_curves();
         let residuals = edge_normals::residuals(&self.network, &slopes);

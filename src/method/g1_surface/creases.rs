@@ -5,12 +5,12 @@
 //! Where a single crease ends within the surface its end has one normal, and the surface is smooth around that vertex.
 //!
 //! Edges are creases when the generator says so, the model's list names them, their quads carry different labels in the
-//! file, or their planes meet at more than an angle.
+//! file or name different normals at their corners, or their planes meet at more than an angle.
 
 use super::problem::Truth;
 use super::settings::Settings;
 use super::vertex_normals;
-use crate::linalg::vector3::{cross, dot, subtract, times};
+use crate::linalg::vector3::{add, cross, dot, subtract, times};
 use crate::mesh::crease;
 use crate::mesh::format::Content;
 use crate::mesh::quadrilateral::{Connectivity, QuadrilateralMesh};
@@ -37,10 +37,19 @@ pub struct Sources {
     pub listed: Vec<[u32; 2]>,
     /// A label for every quad.
     pub labels: Option<Vec<f64>>,
+    /// The quads as they were read, and the normals that their corners name.
+    pub corners: Option<CornerNormals>,
     /// Whether edges may have been halved by a split of the file's triangles since they were listed.
     pub halved: bool,
     /// Number of vertices in the file, to which listed edges refer.
     pub vertices: Option<usize>,
+}
+
+/// Normals at the corners of quads.
+#[derive(Clone, Debug, Default)]
+pub struct CornerNormals {
+    pub quads: Vec<[u32; 4]>,
+    pub normals: Vec<[[f64; 3]; 4]>,
 }
 
 /// Pairs of vertices, one a line, counted from 0; empty lines and what follows a `#` are passed over.
@@ -154,6 +163,13 @@ pub fn sharp(
     if let Some(labels) = &sources.labels {
         add(crease::by_label(connectivity, labels));
     }
+    if let Some(corners) = &sources.corners {
+        add(crease::by_corner_normals(
+            connectivity,
+            &corners.quads,
+            &corners.normals,
+        ));
+    }
     if let Some(degrees) = settings.crease_angle {
         add(crease::by_angle(mesh, connectivity, degrees));
     }
@@ -206,8 +222,8 @@ pub fn point_backward(mesh: &QuadrilateralMesh, normals: &[[f64; 3]], used: impl
     2 * backward > all
 }
 
-/// Gives the vertices on creases a normal for each side: that of the side's formula where there is one, else estimated from
-/// the side's quads.
+/// Gives the vertices on creases a normal for each side: that of the side's formula where there is one, the mean of those that
+/// the side's corners name in the file, else one estimated from the side's quads.
 ///
 /// # Errors
 /// When no normal can be estimated.
@@ -216,6 +232,7 @@ pub fn normals_by_side(
     mesh: &QuadrilateralMesh,
     connectivity: &Connectivity,
     truth: Option<&Truth>,
+    corners: Option<&CornerNormals>,
     normals: &mut [[f64; 3]],
 ) -> Result<(), String> {
     let mut copies = vec![0u32; creases.whole.points.len()];
@@ -231,6 +248,24 @@ pub fn normals_by_side(
                 .filter(|&vertex| on_crease(vertex))
             {
                 normals[vertex] = pieces.pieces[piece as usize].normal(mesh.points[vertex]);
+            }
+        }
+        return Ok(());
+    }
+    if let Some(corners) = corners {
+        for vertex in (0..normals.len()).filter(|&vertex| on_crease(vertex)) {
+            normals[vertex] = [0.0; 3];
+        }
+        for (quad, (names, given)) in mesh.quads.iter().zip(corners.quads.iter().zip(&corners.normals)) {
+            for vertex in quad
+                .map(|vertex| vertex as usize)
+                .into_iter()
+                .filter(|&vertex| on_crease(vertex))
+            {
+                if let Some(corner) = names.iter().position(|&name| name == creases.original[vertex]) {
+                    let size = dot(given[corner], given[corner]).sqrt().max(f64::MIN_POSITIVE);
+                    normals[vertex] = add(normals[vertex], times(given[corner], 1.0 / size));
+                }
             }
         }
         return Ok(());

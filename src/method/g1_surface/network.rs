@@ -137,13 +137,16 @@ impl Network {
         normals: &[[f64; 3]],
         creases: Option<&Creases>,
     ) -> Result<(Self, Vec<String>), String> {
+        // Messages name vertices as the model does.
+        let named = |vertex: u32| creases.map_or(vertex, |creases| creases.original[vertex as usize]);
         let mut units = Vec::with_capacity(normals.len());
         for (vertex, &normal) in normals.iter().enumerate() {
             let size = length(normal);
             if !(size > 0.0 && size.is_finite()) {
                 return Err(format!(
-                    "vertex {vertex} (from 0) has no normal: {normal:?}; give a vector of any length but zero, or estimate \
-                     all of them (vertex_normals = \"estimated\")"
+                    "vertex {} (from 0) has no normal: {normal:?}; give a vector of any length but zero, or estimate all of \
+                     them (vertex_normals = \"estimated\")",
+                    named(vertex as u32)
                 ));
             }
             units.push(normal.map(|component| component / size));
@@ -176,7 +179,7 @@ impl Network {
         if let Some(creases) = creases {
             network.follow_creases(creases)?;
         }
-        network.check(&mut notices)?;
+        network.check(&named, &mut notices)?;
         Ok((network, notices))
     }
 
@@ -296,15 +299,15 @@ impl Network {
     }
 
     /// Whether the tangent planes carry the curves.
-    fn check(&self, notices: &mut Vec<String>) -> Result<(), String> {
+    fn check(&self, named: &dyn Fn(u32) -> u32, notices: &mut Vec<String>) -> Result<(), String> {
         for (edge, tangents) in self.connectivity.edges.iter().zip(&self.tangents) {
             let chord = length(subtract(self.points[edge[1] as usize], self.points[edge[0] as usize]));
             for (end, &tangent) in tangents.iter().enumerate() {
                 if !(length(tangent) > FLAT * chord) {
                     return Err(format!(
                         "the normal at vertex {} is parallel to the edge to vertex {} (counted from 0); correct the normal",
-                        edge[end],
-                        edge[1 - end]
+                        named(edge[end]),
+                        named(edge[1 - end])
                     ));
                 }
             }
@@ -318,9 +321,10 @@ impl Network {
                 let sine =
                     dot(self.normals[vertex], cross(a.tangent, b.tangent)) / (length(a.tangent) * length(b.tangent));
                 if sine.abs() < FLAT {
-                    let [a, b] = [a.edge, b.edge].map(|edge| self.connectivity.other_end(edge, vertex as u32));
+                    let [a, b] = [a.edge, b.edge].map(|edge| named(self.connectivity.other_end(edge, vertex as u32)));
+                    let here = named(vertex as u32);
                     return Err(format!(
-                        "at vertex {vertex} the edges to vertices {a} and {b} (counted from 0) leave in one line as seen \
+                        "at vertex {here} the edges to vertices {a} and {b} (counted from 0) leave in one line as seen \
                          along the normal, or the normal is tangent to their plane; move the vertex or correct its normal"
                     ));
                 }
@@ -329,7 +333,8 @@ impl Network {
                 }
             }
         }
-        if let Some(first) = folds.first() {
+        if let Some(&first) = folds.first() {
+            let first = named(first);
             notices.push(format!(
                 "at {} vertices, the first is vertex {first}, a corner is turned over as seen along the normal: the surface \
                  folds there",

@@ -1,7 +1,7 @@
 //! The problem that a model poses: a checked surface of quadrilaterals with a normal at every vertex, and the surface on
 //! which the vertices lie, where it is known.
 
-use super::creases::{self, Creases, Sources};
+use super::creases::{self, CornerNormals, Creases, Sources};
 use super::model::{DUAL_CONTOURING, RAYS};
 use super::sampled::Sampled;
 use super::settings::{Settings, VertexNormals};
@@ -91,7 +91,8 @@ impl Problem {
         }
         let mut normals = normals(&mut mesh, &connectivity, truth.as_ref(), settings, &mut notices)?;
         if let Some(creases) = &creases {
-            creases::normals_by_side(creases, &mesh, &connectivity, truth.as_ref(), &mut normals)
+            let corners = sources.corners.as_ref();
+            creases::normals_by_side(creases, &mesh, &connectivity, truth.as_ref(), corners, &mut normals)
                 .map_err(|reason| invalid(format!("mesh: {reason}")))?;
         }
         Ok(Problem {
@@ -128,6 +129,11 @@ fn given(
         return Err(invalid(format!(
             "crease_field = \"{field}\" names a field of a file, but the mesh is generated; leave it out"
         )));
+    }
+    if matches!(part, Part::Generated { .. }) && settings.crease_normals {
+        return Err(invalid(
+            "crease_normals reads the normals of a file's corners, but the mesh is generated; leave it out".to_string(),
+        ));
     }
     match part {
         Part::Generated { generator, parameters } if generator == RAYS || generator == DUAL_CONTOURING => {
@@ -242,11 +248,27 @@ fn read_quads(
         }
         _ => None,
     };
+    let corners = if settings.keeps_creases() && settings.crease_normals {
+        let normals = format::quad_corner_normals(bytes).filter(|normals| normals.len() == mesh.quads.len());
+        let normals = normals.ok_or_else(|| {
+            invalid(format!(
+                "{name}: crease_normals needs an OBJ file of quadrilaterals alone, each corner with a normal (`f 1//1 2//1 \
+                 3//1 4//1`); leave crease_normals out, or use crease_angle"
+            ))
+        })?;
+        Some(CornerNormals {
+            quads: mesh.quads.clone(),
+            normals,
+        })
+    } else {
+        None
+    };
     Ok(Given {
         mesh,
         truth: None,
         sources: Sources {
             listed: Vec::new(),
+            corners,
             labels,
             halved: !content.triangles.is_empty(),
             vertices: Some(content.points.len()),

@@ -22,6 +22,8 @@ pub struct Repaired {
     pub tries: u64,
     /// Longest change of a tangent from the natural cubic, relative to its length.
     pub change: f64,
+    /// Whether a try was kept; then all conditions on tangents and normals are met.
+    pub kept: bool,
     pub notice: Option<String>,
 }
 
@@ -71,6 +73,7 @@ pub fn repair(
         if count(&still) < before {
             (*network, *slopes, *fitted, folded) = (changed, found.slopes, tried, still);
             done.change = done.change.max(found.largest_change);
+            done.kept = true;
         }
     }
     done

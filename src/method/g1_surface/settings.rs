@@ -84,6 +84,13 @@ pub static FIELDS: &[Field] = &[
               are sharp.",
     },
     Field {
+        name: "crease_normals",
+        kind: Kind::Boolean,
+        default: Default::Boolean(false),
+        doc: "Edges are sharp where the quadrilaterals of an OBJ file name different normals at its ends; each side takes those \
+              of its own corners.",
+    },
+    Field {
         name: "tangents",
         kind: Kind::Choice(&[
             (
@@ -303,6 +310,7 @@ pub struct Settings {
     pub crease_angle: Option<f64>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub crease_field: Option<String>,
+    pub crease_normals: bool,
     pub tangents: Tangents,
     pub tangent_stiffness: f64,
     pub repair: bool,
@@ -416,7 +424,7 @@ impl Settings {
             }
         };
         if !self.keeps_creases() {
-            drop(&["crease_angle", "crease_field"]);
+            drop(&["crease_angle", "crease_field", "crease_normals"]);
         }
         if self.geometry != Geometry::G1 {
             drop(&[

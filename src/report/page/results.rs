@@ -222,7 +222,8 @@ fn card(experiment: &Experiment, row: &Row, picture: &str) -> String {
         let _ = write!(
             text,
             "<dt>{}</dt><dd>{}{unit}</dd>",
-            escape(name),
+            // A narrow card breaks long names between their words.
+            escape(name).replace('_', "_<wbr/>"),
             round(value, quantity.digits).unicode()
         );
     }

@@ -196,6 +196,48 @@ fn pivots_of_known_signs_agree_with_dense_algebra() {
 }
 
 #[test]
+fn known_signs_give_the_same_bits_with_any_number_of_threads() {
+    // Three unknowns a vertex and fronts large enough to be shared: -, +, - as in a chain of two saddle points.
+    let (points, cells) = grid(13);
+    let graph = Graph::of_cells(points.len(), &cells, Some);
+    let solve = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| {
+            let pattern = BlockPattern::<3>::of_graph(&graph, &nested_dissection(&graph, &points));
+            let mut values = vec![0.0; pattern.values_len()];
+            for vertex in 0..graph.len() {
+                // v: -K, w: +1 and -1 to v, u: K to w, with K a graph's Laplacian plus a little.
+                let k = graph.degree(vertex as u32) as f64 + 0.5;
+                let (start, _) = pattern.block(vertex, vertex).expect("the diagonal");
+                values[start..start + 9].copy_from_slice(&[-k, -1.0, 0.0, -1.0, 0.5, k, 0.0, k, 0.0]);
+                for &other in graph.neighbours(vertex as u32) {
+                    let (start, _) = pattern.block(vertex, other as usize).expect("an edge");
+                    values[start..start + 9].copy_from_slice(&[1.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, -1.0, 0.0]);
+                }
+            }
+            let mut factor = BlockCholesky::with_signs(pattern, [-1.0, 1.0, -1.0]);
+            factor.factorize(&values, 0.0).expect("signs as expected");
+            let dimension = factor.pattern().dimension();
+            let right = noise(2 * dimension, 11);
+            let mut x = right.clone();
+            factor.solve_many_in_place(&mut x, 2);
+            for (x, right) in x.chunks(dimension).zip(right.chunks(dimension)) {
+                let mut image = vec![0.0; dimension];
+                factor.pattern().multiply(&values, x, &mut image);
+                let size = x.iter().fold(0.0f64, |size, x| size.max(x.abs()));
+                for (image, right) in image.iter().zip(right) {
+                    assert!((image - right).abs() < 1e-11 * size.max(1.0), "{image} {right}");
+                }
+            }
+            x.iter().map(|x| x.to_bits()).collect::<Vec<u64>>()
+        })
+    };
+    let one = solve(1);
+    assert_eq!(one, solve(2));
+    assert_eq!(one, solve(4));
+}
+
+#[test]
 fn a_matrix_that_is_not_positive_is_named_and_recovered_from() {
     let (points, cells) = grid(4);
     let pattern = BlockPattern::<3>::new(&points, &cells, &inside(&points)).unwrap();

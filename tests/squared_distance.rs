@@ -1,4 +1,4 @@
-//! Voronoi squared distance terms: stored reference values, derivatives, invariance, one result for any number of threads.
+//! Voronoi squared distance terms: stored reference values, derivatives and their order, invariance, one result for any number of threads.
 
 use serde_json::Value;
 use vargeo::geometry::point_tree::PointTree;
@@ -172,6 +172,15 @@ fn derivatives() {
                     assert!(
                         error < 1e-6,
                         "s = {s}, compatibility {weight}, facets {facets}, gradient {which}: {slope} and {measured}"
+                    );
+                    // What Taylor's first two terms leave falls as the square of the step.
+                    let start = at(0.0);
+                    let [long, short] = [2e-4, 2e-4 / 16.0].map(|t| (at(t) - start - t * slope).abs());
+                    let rounding = 1e-14 * start.abs();
+                    let order = (long / short).log(16.0);
+                    assert!(
+                        long < 16.0 * rounding || (order - 2.0).abs() < 0.15,
+                        "s = {s}, compatibility {weight}, facets {facets}, gradient {which}: order {order}"
                     );
                 }
             }

@@ -5,7 +5,7 @@ use vargeo::mesh::generate::shape::{generate_shape, shapes};
 use vargeo::mesh::generate::template::{generate_template, templates};
 use vargeo::mesh::surface::Surface;
 use vargeo::method::model::{LoadedModel, Part};
-use vargeo::method::surface_fit::objective::FitObjective;
+use vargeo::method::surface_fit::objective::{FitObjective, Target};
 use vargeo::method::surface_fit::settings::Settings;
 use vargeo::method::surface_fit::{SurfaceFit, fitted_mesh, sampling};
 use vargeo::method::{Inputs, Method, Outcome};
@@ -47,7 +47,16 @@ fn gradient_is_that_of_the_value() {
             let (fitted, map) = fitted_mesh(&control, &[], &settings);
             let samples = sampling::sample(&target, fitted.points.len(), &settings, &mut Silent).unwrap();
             let stage = settings.stages()[0];
-            let mut objective = FitObjective::new(&target, &samples, &fitted, &map, &settings, stage).unwrap();
+            let mut objective = FitObjective::new(
+                Target::Surface(&target),
+                &samples,
+                &fitted,
+                &map,
+                &control.points,
+                &settings,
+                stage,
+            )
+            .unwrap();
             let x = control.points.as_flattened().to_vec();
             let mut gradient = vec![0.0; x.len()];
             objective.gradient(&x, &mut gradient);
@@ -129,11 +138,53 @@ fn bad_models_are_refused_with_the_reason() {
         parameters: json!({}),
     };
     for (text, expected) in [
-        ("v 0 0 0\nv 1 0 0\nv 0 1 0\n", "no triangles"),
+        ("v 0 0 0\nv 1 0 0\nv 0 1 0\n", "no cloud"),
+        ("v 0 0 0\nv 1 0 0\nv 0 1 0\nv nan 1 0\n", "bad.obj"),
         ("v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n", "area"),
         ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", "bad.obj"),
     ] {
         let error = fit(file(text), template(), json!({})).unwrap_err();
+        assert!(error.contains(expected), "{error}");
+    }
+}
+
+/// A text of points, and the points of a shape, are fitted without a surface; bad lines are named.
+#[test]
+fn clouds_are_fitted() {
+    let cloud = |text: String| Part::File {
+        name: "cloud.xyz".to_string(),
+        bytes: text.into_bytes(),
+        parameters: json!({}),
+    };
+    let settings = json!({ "subdivisions": 1, "iteration_limit": 40 });
+    let template = || generated("box", json!({ "quads": 54 }));
+    let shape = generate_shape("ellipsoid", &json!({ "triangles": 2000 })).unwrap();
+    let lines: Vec<String> = shape
+        .points
+        .iter()
+        .map(|[x, y, z]| format!("{x} {y} {z} 0.5"))
+        .collect();
+    let outcome = fit(
+        cloud(format!("# points\n{}\n", lines.join("\n"))),
+        template(),
+        settings.clone(),
+    )
+    .unwrap();
+    assert!(
+        outcome.metrics["hausdorff_target_to_fit"] < 1.0,
+        "{:?}",
+        outcome.metrics
+    );
+    let shape = json!({ "triangles": 2000, "cloud": true });
+    let outcome = fit(generated("ellipsoid", shape), template(), settings).unwrap();
+    assert!(outcome.metrics["hausdorff"] < 1.5, "{:?}", outcome.metrics);
+    for (text, expected) in [
+        ("1 2 3\n1 2 x\n", "cloud.xyz:2"),
+        ("7\n", "no points"),
+        ("1 2 3\n1 2 3\n", "no cloud"),
+        ("", "no points"),
+    ] {
+        let error = fit(cloud(text.to_string()), template(), json!({})).unwrap_err();
         assert!(error.contains(expected), "{error}");
     }
 }

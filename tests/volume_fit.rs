@@ -6,6 +6,7 @@ use vargeo::fem::basis;
 use vargeo::fem::batches::unit_reference;
 use vargeo::fem::boundary::Boundary;
 use vargeo::fem::certificate::{Certifier, Verdict};
+use vargeo::fem::coefficient_file;
 use vargeo::fem::space::Space;
 use vargeo::mesh::TriangleMesh;
 use vargeo::mesh::mixed::{MixedMesh, Shape};
@@ -315,4 +316,113 @@ fn certificates_of_prisms_and_tetrahedra_hold_and_find_failures() {
             }
         }
     }
+}
+
+#[test]
+fn a_shell_takes_its_thickness_and_leaves_the_surface_where_it_is() {
+    let outcome = fit(
+        json!({ "generate": "shell", "distance": 4.0, "layers": 2, "side": "both" }),
+        Some(json!({ "shape": "ellipsoid", "triangles": 200 })),
+        json!({ "order": 1, "iteration_limit": 300 }),
+    )
+    .unwrap();
+    let metric = |name: &str| outcome.metrics[name];
+    assert_eq!(metric("prisms"), 4.0 * 192.0);
+    assert_eq!(metric("inverted"), 0.0);
+    assert_eq!(metric("certified"), metric("elements"));
+    assert!(
+        metric("thickness_error_mean") < 5.0,
+        "{}",
+        metric("thickness_error_mean")
+    );
+    assert!(
+        metric("scaled_jacobian_mean") > 0.8,
+        "{}",
+        metric("scaled_jacobian_mean")
+    );
+    let volume = coefficient_file::read(&outcome.files["coefficients"]).unwrap();
+    let plain = fit(
+        json!({ "generate": "shell", "distance": 4.0, "layers": 2, "side": "both" }),
+        Some(json!({ "shape": "ellipsoid", "triangles": 200 })),
+        json!({ "order": 1, "iteration_limit": 0 }),
+    )
+    .unwrap();
+    let start = coefficient_file::read(&plain.files["coefficients"]).unwrap();
+    // 192 triangles of a closed surface have 98 vertices.
+    assert_eq!(volume.mesh.points[..98], start.mesh.points[..98]);
+    assert!(volume.mesh.points[98..] != start.mesh.points[98..]);
+}
+
+#[test]
+fn a_coefficient_file_is_a_template() {
+    let part = |bytes: Vec<u8>| Part::File {
+        name: "start.coefficients".to_string(),
+        bytes,
+        parameters: json!({}),
+    };
+    let settings = json!({ "order": 3, "iteration_limit": 20 });
+    let target = json!({ "shape": "ellipsoid", "triangles": 400 });
+    let template = json!({ "generate": "grid", "x": 1, "y": 1, "z": 1, "recipe": [{ "op": "pillow" }] });
+    let first = fit(template, Some(target), settings).unwrap();
+    let again = |settings: Value, bytes: Vec<u8>| {
+        let mut parts = BTreeMap::new();
+        parts.insert("template".to_string(), part(bytes));
+        parts.insert(
+            "target".to_string(),
+            Part::Generated {
+                generator: "ellipsoid".to_string(),
+                parameters: json!({ "triangles": 400 }),
+            },
+        );
+        let inputs = Inputs {
+            settings: &settings,
+            model: LoadedModel { parts },
+        };
+        VolumeFit.run(inputs, &mut Silent)
+    };
+    let bytes = first.files["coefficients"].clone();
+    // Nothing moves: the same volume, with the orders of the file.
+    let still = again(
+        json!({ "schedule": [{ "lambda": 0.05, "order": 1, "iterations": 0 }] }),
+        bytes.clone(),
+    )
+    .unwrap();
+    assert_eq!(still.metrics["order_max"], 3.0);
+    for name in ["hausdorff", "scaled_jacobian_mean", "energy_volume"] {
+        let (a, b) = (first.metrics[name], still.metrics[name]);
+        assert!((a - b).abs() < 1e-9 * a.abs(), "{name}: {a} {b}");
+    }
+    let other = again(json!({ "basis": "integrated-fourier", "order": 3 }), bytes).unwrap_err();
+    assert!(
+        other.reason.contains("basis = \"integrated-legendre\""),
+        "{}",
+        other.reason
+    );
+}
+
+#[test]
+fn a_subdivision_volume_comes_nearer_with_every_level() {
+    let run = |levels: u64| {
+        fit(
+            json!({ "generate": "grid", "x": 2, "y": 2, "z": 2 }),
+            Some(json!({ "shape": "ellipsoid", "triangles": 400 })),
+            json!({ "order": 1, "subdivision_levels": levels, "crease_angle": 180.0, "iteration_limit": 40 }),
+        )
+        .unwrap()
+    };
+    let (one, two) = (run(1), run(2));
+    assert_eq!(one.metrics["elements"], 64.0);
+    assert_eq!(two.metrics["elements"], 512.0);
+    for outcome in [&one, &two] {
+        assert_eq!(outcome.metrics["inverted"], 0.0);
+        assert_eq!(outcome.metrics["increases"], 0.0);
+    }
+    let rms = |outcome: &Outcome| outcome.metrics["distance_rms"];
+    assert!(rms(&two) < 0.75 * rms(&one), "{} {}", rms(&one), rms(&two));
+    let refused = fit(
+        json!({ "generate": "grid", "x": 2, "y": 2, "z": 2 }),
+        Some(json!({ "shape": "ellipsoid", "triangles": 400 })),
+        json!({ "order": 2, "subdivision_levels": 1 }),
+    );
+    assert!(refused.unwrap_err().reason.contains("order = 1"));
 }

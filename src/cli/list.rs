@@ -19,6 +19,8 @@ pub struct Arguments {
     /// What to explain.
     #[arg(value_enum)]
     list: Option<List>,
+    /// Only what belongs to this method, for metrics, traces, settings and models.
+    method: Option<String>,
 }
 
 /// The lists.
@@ -73,15 +75,25 @@ struct Group {
 /// Prints the lists.
 pub fn execute(arguments: Arguments) -> Exit {
     let mut text = String::new();
+    let all: Vec<&'static dyn Method> = methods()
+        .iter()
+        .copied()
+        .filter(|method| arguments.method.as_deref().is_none_or(|name| name == method.name()))
+        .collect();
+    if all.is_empty() {
+        let names: Vec<&str> = methods().iter().map(|method| method.name()).collect();
+        eprintln!("error: no method has this name; there are {}", names.join(", "));
+        return Exit::FileWrong;
+    }
     match arguments.list {
         Some(list) => {
-            for group in groups(list) {
+            for group in groups(list, &all) {
                 explain(&group, &mut text);
             }
         }
         None => {
             for list in LISTS {
-                let names: Vec<String> = groups(*list)
+                let names: Vec<String> = groups(*list, &all)
                     .into_iter()
                     .flat_map(|group| group.items)
                     .map(|item| item.name)
@@ -139,7 +151,7 @@ fn wrap(words: &str, indent: usize, text: &mut String) {
     }
 }
 
-fn groups(list: List) -> Vec<Group> {
+fn groups(list: List, all: &[&'static dyn Method]) -> Vec<Group> {
     let one = |items: Vec<Item>| {
         vec![Group {
             heading: String::new(),
@@ -182,7 +194,7 @@ fn groups(list: List) -> Vec<Group> {
             .iter()
             .map(|(name, meaning)| item(name, "", vec![(*meaning).to_owned()]))
             .collect()),
-        List::Metrics => by_method(|method| {
+        List::Metrics => by_method(all, |method| {
             let metric = |metric: crate::metric::Metric| {
                 let mut notes = Vec::new();
                 if !metric.unit.is_empty() {
@@ -200,25 +212,24 @@ fn groups(list: List) -> Vec<Group> {
             };
             columns(method).into_iter().map(metric).collect()
         }),
-        List::Traces => by_method(|method| {
+        List::Traces => by_method(all, |method| {
             let traces = method.traces().iter();
             traces
                 .map(|(name, meaning)| item(name, "", vec![(*meaning).to_owned()]))
                 .collect()
         }),
-        List::Settings => by_method(|method| {
+        List::Settings => by_method(all, |method| {
             let mut items = Vec::new();
             settings(method.settings(), "", &mut items);
             items
         }),
-        List::Models => methods().iter().flat_map(|method| models(*method)).collect(),
+        List::Models => all.iter().flat_map(|method| models(*method)).collect(),
     }
 }
 
 /// A group for each method.
-fn by_method(items: impl Fn(&'static dyn Method) -> Vec<Item>) -> Vec<Group> {
-    methods()
-        .iter()
+fn by_method(all: &[&'static dyn Method], items: impl Fn(&'static dyn Method) -> Vec<Item>) -> Vec<Group> {
+    all.iter()
         .map(|method| Group {
             heading: format!("of method {}", method.name()),
             items: items(*method),
@@ -227,13 +238,21 @@ fn by_method(items: impl Fn(&'static dyn Method) -> Vec<Item>) -> Vec<Group> {
 }
 
 /// Settings by dotted path.
-fn settings(fields: &[Field], prefix: &str, items: &mut Vec<Item>) {
+fn settings(fields: &'static [Field], prefix: &str, items: &mut Vec<Item>) {
     for field in fields {
         let name = format!("{prefix}{}", field.name);
         items.push(setting(field, &name));
-        if let Kind::Table(inner) = &field.kind {
-            settings(inner, &format!("{name}."), items);
-        }
+        within(&field.kind, &name, items);
+    }
+}
+
+/// The fields of a table, of the tables of a list as `name[].field`, and of those among alternatives.
+fn within(kind: &'static Kind, name: &str, items: &mut Vec<Item>) {
+    match kind {
+        Kind::Table(inner) => settings(inner, &format!("{name}."), items),
+        Kind::List(each) => within(each, &format!("{name}[]"), items),
+        Kind::OneOf(kinds) => kinds.iter().for_each(|kind| within(kind, name, items)),
+        _ => {}
     }
 }
 
@@ -268,17 +287,26 @@ fn models(method: &'static dyn Method) -> Vec<Group> {
     let role = |role: &'static crate::method::model::Role| {
         let file = if role.file { " Or the path of a file." } else { "" };
         let mut items = Vec::new();
+        let describe = |field: &Field| {
+            let parameter = setting(field, field.name);
+            let space = if parameter.note.is_empty() { "" } else { " " };
+            format!(
+                "{}{space}{}: {}",
+                parameter.name,
+                parameter.note,
+                parameter.text.join(" ")
+            )
+        };
+        if role.file && !role.file_parameters.is_empty() {
+            items.push(Item {
+                name: "{ file = \"PATH\", ... }".to_owned(),
+                note: String::new(),
+                text: role.file_parameters.iter().map(describe).collect(),
+            });
+        }
         for generator in role.generators {
             let mut text = vec![generator.doc.to_owned()];
-            for field in generator.parameters {
-                let parameter = setting(field, field.name);
-                text.push(format!(
-                    "{} {}: {}",
-                    parameter.name,
-                    parameter.note,
-                    parameter.text.join(" ")
-                ));
-            }
+            text.extend(generator.parameters.iter().map(describe));
             items.push(Item {
                 name: generator.name.to_owned(),
                 note: String::new(),

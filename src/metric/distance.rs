@@ -1,8 +1,9 @@
 //! Distances between surfaces: the Hausdorff distance both ways, mean and root of mean square (Cignoni, Rocchini, Scopigno
 //! 1998, Metro: measuring error on simplified surfaces).
 //!
-//! Every triangle is cut into equal parts whose centres are the samples, so that mean and root of mean square are plain
-//! quadratures over the area. The largest distance is then hunted down by branch and bound from the largest sample: the
+//! Every triangle is cut into equal parts whose centres and corners are the samples, so that mean and root of mean square are
+//! quadratures over the area. (Means over all samples of vertices, edges and faces alike, as some programs print them, are
+//! larger: distances are largest along edges, which have no area.) The largest distance is then hunted down by branch and bound from the largest sample: the
 //! distance to one triangle is convex, so over a piece of surface it is largest at a corner, and the least of these over a
 //! few near triangles bounds the distance to the whole surface.
 //!
@@ -258,7 +259,8 @@ pub fn one_sided(surface: &TriangleMesh, to: &ClosestPoint, sampling: Sampling) 
     }
 }
 
-/// Samples a chunk of triangles at the centres of their parts and at their corners.
+/// Samples a chunk of triangles at the centres and corners of their parts. Centres weigh 3/4 and corners 1/12, which is exact
+/// for quadratic polynomials.
 fn sample(
     surface: &TriangleMesh,
     triangles: &[[u32; 3]],
@@ -274,7 +276,7 @@ fn sample(
         max: 0.0,
         place: surface.points[triangles[0][0] as usize],
     };
-    let (mut points, mut found): (Vec<[f64; 3]>, Vec<Nearest>) = (Vec::new(), Vec::new());
+    let (mut points, mut weights, mut found): (Vec<[f64; 3]>, Vec<f64>, Vec<Nearest>) = Default::default();
     let mut hint = None;
     for (&triangle, largest) in triangles.iter().zip(largest) {
         let corners = surface.corners(triangle);
@@ -283,7 +285,7 @@ fn sample(
         let longest = length(first).max(length(second)).max(length(subtract(c, b)));
         let parts = ((longest / spacing).ceil() as usize).clamp(1, PARTS);
         points.clear();
-        points.extend(corners);
+        weights.clear();
         let scale = 1.0 / parts as f64;
         let at = |v: f64, w: f64| -> [f64; 3] {
             std::array::from_fn(|axis| a[axis] + scale * (v * first[axis] + w * second[axis]))
@@ -295,6 +297,17 @@ fn sample(
                 let step = if row % 2 == 0 { step } else { count - 1 - step };
                 let shift = if step % 2 == 0 { 1.0 / 3.0 } else { 2.0 / 3.0 };
                 points.push(at((step / 2) as f64 + shift, row as f64 + shift));
+                weights.push(0.75);
+            }
+        }
+        for row in 0..=parts {
+            let last = parts - row;
+            for step in 0..=last {
+                let step = if row % 2 == 0 { step } else { last - step };
+                points.push(at(step as f64, row as f64));
+                // A twelfth for every part that has this corner.
+                let borders = [step == 0, row == 0, step == last].into_iter().filter(|&on| on).count();
+                weights.push([0.5, 0.25, 1.0 / 12.0][borders.min(2)]);
             }
         }
         found.clear();
@@ -306,10 +319,8 @@ fn sample(
             if nearest.squared_distance > most.0 {
                 most = (nearest.squared_distance, index);
             }
-            if index >= 3 {
-                one += nearest.squared_distance.sqrt();
-                two += nearest.squared_distance;
-            }
+            one += weights[index] * nearest.squared_distance.sqrt();
+            two += weights[index] * nearest.squared_distance;
         }
         let area = length(area_vector(corners)) / 2.0;
         let weight = area * scale * scale;

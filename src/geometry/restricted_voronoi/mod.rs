@@ -134,6 +134,7 @@ struct Scratch {
 /// The sites nearest to a triangle's vertices, and how near another one must come to own a part of it.
 #[derive(Clone, Copy, Debug)]
 struct Reach {
+    triangle: u32,
     corners: [[f64; 3]; 3],
     near: [u32; 3],
     /// The one of `near` that is nearest to all three vertices together.
@@ -145,7 +146,13 @@ struct Reach {
 
 impl Reach {
     #[inline(always)]
-    fn new(corners: [[f64; 3]; 3], near: [u32; 3], positions: &[[f64; 3]], offset: impl Fn(u32) -> f64) -> Reach {
+    fn new(
+        triangle: u32,
+        corners: [[f64; 3]; 3],
+        near: [u32; 3],
+        positions: &[[f64; 3]],
+        offset: impl Fn(u32) -> f64,
+    ) -> Reach {
         let mut bounds = [[0.0; 3]; 3];
         for k in 0..3 {
             bounds[k] = if k > 0 && near[k] == near[k - 1] {
@@ -171,6 +178,7 @@ impl Reach {
             }
         }
         Reach {
+            triangle,
             corners,
             near,
             reference,
@@ -445,6 +453,7 @@ impl RestrictedVoronoi {
         if near[0] == near[1] && near[0] == near[2] {
             // Cells are convex. Rows are needed where normals matter only, and are then made anew.
             return Reach {
+                triangle,
                 corners,
                 near,
                 reference: near[0],
@@ -452,14 +461,13 @@ impl RestrictedVoronoi {
                 count: 1,
             };
         }
-        Reach::new(corners, near, sites.points(), |_| 0.0)
+        Reach::new(triangle, corners, near, sites.points(), |_| 0.0)
     }
 
     /// Cuts one triangle, whose sites are `at_hand` if so it says.
     #[inline(always)]
     fn cut<V: Vector>(
         &self,
-        triangle: u32,
         reach: &Reach,
         at_hand: bool,
         sites: &PointTree,
@@ -493,7 +501,7 @@ impl RestrictedVoronoi {
         };
         let reach = match compatibility {
             None => *reach,
-            Some(_) => Reach::new(corners, reach.near, positions, offset),
+            Some(_) => Reach::new(reach.triangle, corners, reach.near, positions, offset),
         };
         let reference = reach.reference;
         found.clear();
@@ -628,7 +636,7 @@ impl RestrictedVoronoi {
         }
         for &(owner, start, end) in &polygons.parts {
             visit(&Cut {
-                triangle,
+                triangle: reach.triangle,
                 frame: &frame,
                 candidates,
                 owner: owner as usize,
@@ -678,12 +686,11 @@ impl<Visit: FnMut(&Cut<'_>), Whole: FnMut(&[[f64; 3]; 3], u32) -> bool> Kernel f
             }
             let at_hand =
                 count > 1 && (self.sites).gather::<V>(around.low, around.high, bound, AT_HAND, &mut self.scratch.some);
-            for (&triangle, reach) in triangles.iter().zip(&reaches) {
+            for reach in &reaches {
                 if self.compatibility.is_none() && reach.is_whole() && (self.whole)(&reach.corners, reach.reference) {
                     continue;
                 }
                 diagram.cut::<V>(
-                    triangle,
                     reach,
                     at_hand,
                     self.sites,

@@ -12,6 +12,7 @@ use crate::method::Failure;
 pub(super) struct BlockFactor<const B: usize> {
     name: &'static str,
     values: Vec<f64>,
+    magnitudes: Vec<f64>,
     factor: BlockCholesky<B>,
 }
 
@@ -19,7 +20,13 @@ impl<const B: usize> BlockFactor<B> {
     /// Factorizes a matrix of the factor's structure. `Err`: the vertex of the structure where a pivot has the wrong sign.
     pub fn new(name: &'static str, mut factor: BlockCholesky<B>, values: Vec<f64>) -> Result<Self, u32> {
         factor.factorize(&values, 0.0).map_err(|error| error.vertex)?;
-        Ok(Self { name, values, factor })
+        let magnitudes = values.iter().map(|value| value.abs()).collect();
+        Ok(Self {
+            name,
+            values,
+            magnitudes,
+            factor,
+        })
     }
 }
 
@@ -40,17 +47,15 @@ impl<const B: usize> Factorized for BlockFactor<B> {
         Some(self.factor.pattern().elimination().factor_scalars())
     }
 
-    fn norm(&self) -> f64 {
-        let magnitudes: Vec<f64> = self.values.iter().map(|value| value.abs()).collect();
-        let mut sums = vec![0.0; self.dimension()];
-        let ones = vec![1.0; self.dimension()];
-        self.factor.pattern().multiply(&magnitudes, &ones, &mut sums);
-        sums.into_iter().fold(0.0, f64::max)
-    }
-
     fn multiply(&self, x: &[f64]) -> Vec<f64> {
         let mut result = vec![0.0; x.len()];
         self.factor.pattern().multiply(&self.values, x, &mut result);
+        result
+    }
+
+    fn multiply_magnitudes(&self, x: &[f64]) -> Vec<f64> {
+        let mut result = vec![0.0; x.len()];
+        self.factor.pattern().multiply(&self.magnitudes, x, &mut result);
         result
     }
 

@@ -1,8 +1,8 @@
 //! The sets of vertices and edges that the systems speak of: the open domain, its boundary, and the rings outside.
 
 use crate::linalg::sparse::Graph;
-use crate::mesh::connectivity::{self, CROWDED, NONE};
-use crate::mesh::{TriangleMesh, area_vector, dot, length, subtract};
+use crate::mesh::connectivity::{self, CROWDED, Facets, NONE};
+use crate::mesh::{TriangleMesh, dot, length, subtract};
 use crate::method::Failure;
 
 /// Where a vertex stands.
@@ -50,6 +50,42 @@ fn invalid(reason: String) -> Failure {
     }
 }
 
+/// The triangles beside each triangle of a mesh, which has to be an oriented manifold: handles and boundary loops rely on it.
+///
+/// # Errors
+/// Names the first triangle or vertex where it is none, or two neighbours that are oriented against each other.
+pub fn manifold(mesh: &TriangleMesh) -> Result<Facets<3>, Failure> {
+    let vertices = mesh.points.len();
+    let facets = connectivity::facets(&mesh.cells, vertices);
+    if facets.crowded > 0 {
+        return Err(invalid(format!(
+            "{} edges have three or more triangles, the first at triangle {} (counted from 0); the surface must be a \
+             manifold: separate the sheets there",
+            facets.crowded, facets.first_crowded
+        )));
+    }
+    if let Some(&pinched) = connectivity::pinched_vertices(&mesh.cells, vertices, &facets).first() {
+        return Err(invalid(format!(
+            "parts of the surface touch in the single vertex {pinched} (counted from 0); the surface must be a manifold: \
+             split the vertex"
+        )));
+    }
+    for (index, (cell, neighbours)) in mesh.cells.iter().zip(&facets.neighbours).enumerate() {
+        for (corner, &neighbour) in neighbours.iter().enumerate() {
+            let (from, to) = (cell[(corner + 1) % 3], cell[(corner + 2) % 3]);
+            let same = |other: &[u32; 3]| (0..3).any(|i| other[i] == from && other[(i + 1) % 3] == to);
+            if mesh.cells.get(neighbour as usize).is_some_and(same) {
+                return Err(invalid(format!(
+                    "triangles {index} and {neighbour} (counted from 0) run along their edge from vertex {from} to {to} in the \
+                     same direction; turn one of them round, so that all are oriented alike (a surface with one side, \
+                     such as a Moebius strip, has no such orientation)"
+                )));
+            }
+        }
+    }
+    Ok(facets)
+}
+
 impl<'a> Domain<'a> {
     /// The domain of the triangles `inside`; its vertices with `free` are solved for.
     ///
@@ -57,20 +93,7 @@ impl<'a> Domain<'a> {
     /// For a mesh that is not a manifold, no free vertex, or a part without a fixed one.
     pub fn new(mesh: &'a TriangleMesh, inside: Vec<bool>, free: &[bool]) -> Result<Self, Failure> {
         let vertices = mesh.points.len();
-        let facets = connectivity::facets(&mesh.cells, vertices);
-        if facets.crowded > 0 {
-            return Err(invalid(format!(
-                "{} edges have three or more triangles, the first at triangle {} (counted from 0); the surface must be a \
-                 manifold: separate the sheets there",
-                facets.crowded, facets.first_crowded
-            )));
-        }
-        if let Some(&pinched) = connectivity::pinched_vertices(&mesh.cells, vertices, &facets).first() {
-            return Err(invalid(format!(
-                "parts of the surface touch in the single vertex {pinched} (counted from 0); the surface must be a \
-                 manifold: split the vertex"
-            )));
-        }
+        let facets = manifold(mesh)?;
         let graph = Graph::of_cells(vertices, &mesh.cells, Some);
         let mut rim = vec![false; vertices];
         let mut edges = Vec::new();
@@ -156,14 +179,6 @@ impl<'a> Domain<'a> {
             )));
         }
         Ok(())
-    }
-
-    /// Area of the domain's triangles.
-    pub fn area(&self) -> f64 {
-        let inside = self.mesh.cells.iter().zip(&self.inside).filter(|(_, inside)| **inside);
-        inside
-            .map(|(&cell, _)| length(area_vector(self.mesh.corners(cell))) / 2.0)
-            .sum()
     }
 
     /// How many vertices stand at a place.

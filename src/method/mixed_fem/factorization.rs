@@ -14,7 +14,8 @@ use super::signed_system::SignedSystem;
 use crate::linalg::sparse::BlockCholesky;
 use crate::method::Failure;
 
-/// Refinement ends when the residual is down to rounding or does not halve, and after this many steps at the latest.
+/// Refinement, one step at least, ends when the backward error is down to rounding or does not halve, and after this many
+/// steps at the latest.
 const REFINEMENTS: usize = 4;
 
 /// A symmetric matrix with a factor that solves for it.
@@ -26,10 +27,10 @@ pub(super) trait Factorized {
     fn matrix_entries(&self) -> usize;
     /// Numbers stored for the factor; `None` where the factorization does not tell.
     fn factor_entries(&self) -> Option<usize>;
-    /// Largest sum of magnitudes in a row.
-    fn norm(&self) -> f64;
     /// `A x`.
     fn multiply(&self, x: &[f64]) -> Vec<f64>;
+    /// `|A| x` with the magnitudes of the matrix's entries.
+    fn multiply_magnitudes(&self, x: &[f64]) -> Vec<f64>;
     /// Replaces `count` right-hand sides, one after another, by what the factor makes of them.
     fn apply(&self, right: &mut [f64], count: usize) -> Result<(), Failure>;
 }
@@ -69,8 +70,9 @@ impl Factorization {
         Ok(Self(Box::new(factor)))
     }
 
-    /// `L D L^T` factorization of a mixed system; `None` where a pivot has not the sign that it should have.
-    pub fn ldlt(system: SignedSystem) -> Option<Self> {
+    /// `L D L^T` factorization of a mixed system. `Err`: the place in the numbering's order of a vertex where a pivot has not
+    /// the sign that it should have.
+    pub fn ldlt(system: SignedSystem) -> Result<Self, u32> {
         let factor: Result<Box<dyn Factorized>, u32> = match system {
             SignedSystem::Two(factor, values) => {
                 BlockFactor::new("ldlt", *factor, values).map(|factor| Box::new(factor) as _)
@@ -79,7 +81,7 @@ impl Factorization {
                 BlockFactor::new("ldlt", *factor, values).map(|factor| Box::new(factor) as _)
             }
         };
-        factor.ok().map(Self)
+        factor.map(Self)
     }
 
     /// `L B L^T` factorization of a mixed system, with its analysis told by `analysed`.
@@ -119,63 +121,91 @@ impl Factorization {
         self.0.factor_entries()
     }
 
-    /// Solves for `count` right-hand sides in place, with refinement; the largest relative residual
-    /// `|b - A x| / (|A| |x| + |b|)` in the maximum norm, not-a-number where the solution is not finite.
+    /// Solves for `count` right-hand sides in place, with refinement.
     ///
     /// # Errors
     /// When memory runs out.
-    pub fn solve(&self, right: &mut [f64], count: usize) -> Result<f64, Failure> {
+    pub fn solve(&self, right: &mut [f64], count: usize) -> Result<Accuracy, Failure> {
         let dimension = self.dimension();
         let wanted = right.to_vec();
         self.0.apply(right, count)?;
-        let norm = self.0.norm();
-        let mut worst = 0.0f64;
+        let mut found = Accuracy::default();
         for column in 0..count {
             let range = column * dimension..(column + 1) * dimension;
-            let wanted = &wanted[range.clone()];
-            let x = &mut right[range];
-            let measure = |x: &[f64]| {
-                let image = self.0.multiply(x);
-                let residual: Vec<f64> = wanted.iter().zip(&image).map(|(b, image)| b - image).collect();
-                let size = norm * largest(x) + largest(wanted);
-                let relative = if size == 0.0 { 0.0 } else { largest(&residual) / size };
-                (residual, relative)
-            };
-            let (mut residual, mut relative) = measure(x);
+            let (wanted, x) = (&wanted[range.clone()], &mut right[range]);
+            let (mut residual, mut backward) = self.backward_error(x, wanted);
+            let mut forward = f64::NAN;
             for _ in 0..REFINEMENTS {
-                if !relative.is_finite() || relative <= f64::EPSILON {
+                if !backward.is_finite() {
                     break;
                 }
                 let mut step = residual.clone();
                 self.0.apply(&mut step, 1)?;
+                let size = largest(x);
+                forward = if size > 0.0 { largest(&step) / size } else { 0.0 };
                 let better: Vec<f64> = x.iter().zip(&step).map(|(x, step)| x + step).collect();
-                let (next, less) = measure(&better);
-                if !(less < 0.5 * relative) {
+                let (next, less) = self.backward_error(&better, wanted);
+                if !(less < backward) {
                     break;
                 }
+                let halved = less < 0.5 * backward;
                 x.copy_from_slice(&better);
-                (residual, relative) = (next, less);
+                (residual, backward) = (next, less);
+                if !halved || backward <= f64::EPSILON {
+                    break;
+                }
             }
-            // `max` would pass over not-a-number.
-            worst = if relative.is_finite() {
-                worst.max(relative)
-            } else {
-                f64::NAN
+            found = Accuracy {
+                backward: larger(found.backward, backward),
+                forward: larger(found.forward, forward),
             };
-            if worst.is_nan() {
-                return Ok(f64::NAN);
-            }
         }
-        Ok(worst)
+        Ok(found)
+    }
+
+    /// The residual `b - A x`, and the smallest relative change of every coefficient of `A` and `b` that makes `x` exact: the
+    /// maximum of `|b - A x| / (|A| |x| + |b|)` over the rows (Oettli and Prager 1964). Rows whose denominator is
+    /// rounding itself are measured against the size of the row and of `x` (Arioli, Demmel and Duff 1989).
+    fn backward_error(&self, x: &[f64], wanted: &[f64]) -> (Vec<f64>, f64) {
+        let image = self.0.multiply(x);
+        let residual: Vec<f64> = wanted.iter().zip(&image).map(|(b, image)| b - image).collect();
+        let magnitudes: Vec<f64> = x.iter().map(|x| x.abs()).collect();
+        let sizes = self.0.multiply_magnitudes(&magnitudes);
+        let rows = self.0.multiply_magnitudes(&vec![largest(x); x.len()]);
+        let error = (0..x.len())
+            .map(|row| {
+                let size = sizes[row] + wanted[row].abs();
+                let tiny = 1e3 * f64::EPSILON * (rows[row] + wanted[row].abs());
+                let size = if size > tiny { size } else { sizes[row] + rows[row] };
+                if residual[row] == 0.0 {
+                    0.0
+                } else {
+                    residual[row].abs() / size
+                }
+            })
+            .fold(0.0, larger);
+        (residual, error)
+    }
+}
+
+/// How good a solution is.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Accuracy {
+    /// Componentwise relative backward error; not-a-number where the solution is not finite.
+    pub backward: f64,
+    /// Size of the last step of refinement against that of the solution: an estimate of what rounding did to it.
+    pub forward: f64,
+}
+
+/// The larger one, not-a-number where one is.
+fn larger(left: f64, right: f64) -> f64 {
+    if left.is_nan() || right.is_nan() {
+        f64::NAN
+    } else {
+        left.max(right)
     }
 }
 
 fn largest(values: &[f64]) -> f64 {
-    values.iter().fold(0.0, |worst: f64, value| {
-        if worst.is_nan() || value.is_nan() {
-            f64::NAN
-        } else {
-            worst.max(value.abs())
-        }
-    })
+    values.iter().fold(0.0, |worst, value| larger(worst, value.abs()))
 }

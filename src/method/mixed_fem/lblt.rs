@@ -116,12 +116,12 @@ impl Factorized for Lblt {
         Some(self.values.len())
     }
 
-    fn norm(&self) -> f64 {
-        self.matrix.norm()
-    }
-
     fn multiply(&self, x: &[f64]) -> Vec<f64> {
         self.matrix.multiply(x)
+    }
+
+    fn multiply_magnitudes(&self, x: &[f64]) -> Vec<f64> {
+        self.matrix.multiply_magnitudes(x)
     }
 
     fn apply(&self, right: &mut [f64], count: usize) -> Result<(), Failure> {

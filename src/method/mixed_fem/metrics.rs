@@ -51,7 +51,16 @@ pub static ALL: &[Metric] = &[
         "",
         Some(0.0),
         Better::Lower,
-        "Largest entry of b - A x over |A| |x| + |b|, of the system that was factorized, after iterative refinement.",
+        "Largest |b - A x| over |A| |x| + |b|, row by row, of the system that was factorized, after iterative refinement: the \
+         componentwise backward error.",
+    ),
+    metric(
+        "rounding",
+        "|dx| / |x|",
+        "",
+        Some(0.0),
+        Better::Neither,
+        "Size of the last step of refinement against that of the solution: an estimate of what rounding did to it.",
     ),
     metric(
         "difference",

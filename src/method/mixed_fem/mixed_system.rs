@@ -24,11 +24,20 @@ impl LowerMatrix {
 
     /// `A x`.
     pub fn multiply(&self, x: &[f64]) -> Vec<f64> {
+        self.product(x, |value| value)
+    }
+
+    /// `|A| x` with the magnitudes of the entries.
+    pub fn multiply_magnitudes(&self, x: &[f64]) -> Vec<f64> {
+        self.product(x, f64::abs)
+    }
+
+    fn product(&self, x: &[f64], of: impl Fn(f64) -> f64) -> Vec<f64> {
         let mut result = vec![0.0; x.len()];
         for column in 0..self.dimension() {
             let mut sum = 0.0;
             for place in self.offsets[column]..self.offsets[column + 1] {
-                let (row, value) = (self.rows[place], self.values[place]);
+                let (row, value) = (self.rows[place], of(self.values[place]));
                 result[row] += value * x[column];
                 if row != column {
                     sum += value * x[row];
@@ -37,20 +46,6 @@ impl LowerMatrix {
             result[column] += sum;
         }
         result
-    }
-
-    /// Largest sum of magnitudes in a row.
-    pub fn norm(&self) -> f64 {
-        let mut sums = vec![0.0; self.dimension()];
-        for column in 0..self.dimension() {
-            for place in self.offsets[column]..self.offsets[column + 1] {
-                sums[self.rows[place]] += self.values[place].abs();
-                if self.rows[place] != column {
-                    sums[column] += self.values[place].abs();
-                }
-            }
-        }
-        sums.into_iter().fold(0.0, f64::max)
     }
 
     /// The number of singular values below 1e-10 of the largest; `None` for more than 600 unknowns, which would take too long.
@@ -130,6 +125,11 @@ impl Numbering {
             count: with.len() * discretization.order,
             scale: scale(discretization),
         }
+    }
+
+    /// The vertex of the mesh at a place in the order.
+    pub(super) fn vertex(&self, place: u32) -> u32 {
+        self.order.get(place as usize).copied().unwrap_or(place)
     }
 
     /// Numbers of the unknowns `u`, `v`, `w` at a vertex, [`NONE`] where the field is known.

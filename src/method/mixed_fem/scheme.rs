@@ -15,12 +15,13 @@
 //!
 //! The relaxation `S` is ours. What the boundary rows of irregular meshes are short of consistency is divided by it, what it
 //! takes away from them is multiplied: `S = c h^2 D` is more accurate on coarse meshes, but then the errors on irregular
-//! ones level off; `S = c h s / 20 D`, `s^2` the domain's area, goes on converging as `h^2` on structured and perturbed
+//! ones level off; `S = c h s / 20 D`, `s^2` the area of the connected part of the domain and `h` its mean edge length, goes on converging as `h^2` on structured and perturbed
 //! meshes as fine as were tried, and on Delaunay meshes with random vertices to some 200 cells a unit length.
 
 use super::domain::{Domain, Place};
-use crate::fem::surface::{SurfaceOperators, mean_edge_length};
-use crate::mesh::{dot, subtract};
+use crate::fem::surface::SurfaceOperators;
+use crate::mesh::connectivity::{self, NONE};
+use crate::mesh::{area_vector, dot, length, subtract};
 use crate::method::Failure;
 
 /// Which discretization.
@@ -60,10 +61,18 @@ pub enum Mass {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Relaxation {
-    /// `c h s / 20 D` with the side `s` of a square of the domain's area.
+    /// `c h s / 20 D` with the side `s` of a square of the area of a connected part of the domain.
     Linear,
     /// `c h^2 D`.
     Quadratic,
+}
+
+/// The relaxation of the boundary rows of the stabilised system.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stabilisation {
+    pub relaxation: Relaxation,
+    /// The factor `c`.
+    pub factor: f64,
 }
 
 /// Values and derivatives that the conditions prescribe, for several components at once: component `c` of vertex `i` is at
@@ -115,7 +124,7 @@ fn invalid(reason: String) -> Failure {
 }
 
 impl<'a> Discretization<'a> {
-    /// Sets up a scheme. `stabilisation` is the factor `c` of the relaxation.
+    /// Sets up a scheme. `stabilisation` counts for the stabilised one alone.
     ///
     /// # Errors
     /// When the domain does not suit the scheme.
@@ -125,8 +134,7 @@ impl<'a> Discretization<'a> {
         scheme: Scheme,
         order: usize,
         mass: Mass,
-        relaxation: Relaxation,
-        stabilisation: f64,
+        stabilisation: Stabilisation,
         data: &Data<'_>,
     ) -> Result<Self, Failure> {
         if scheme == Scheme::Region {
@@ -188,17 +196,15 @@ impl<'a> Discretization<'a> {
                 found.unknown[1] = interior.clone();
                 found.unknown[2] = closed;
                 found.flux = flux(domain, data);
-                let edge = mean_edge_length(domain.mesh);
-                let length = match relaxation {
-                    Relaxation::Linear => domain.area().sqrt() / 20.0,
-                    Relaxation::Quadratic => edge,
+                let relaxed = if scheme == Scheme::Stabilised {
+                    stabilisation.lengths(domain)
+                } else {
+                    vec![0.0; vertices]
                 };
                 for vertex in (0..vertices).filter(|&vertex| domain.places[vertex] == Place::Boundary) {
                     found.known[1][vertex * components..(vertex + 1) * components]
                         .copy_from_slice(&data.laplacian[vertex * components..(vertex + 1) * components]);
-                    if scheme == Scheme::Stabilised {
-                        found.penalty[vertex] = stabilisation * edge * length * operators.barycentric[vertex];
-                    }
+                    found.penalty[vertex] = relaxed[vertex] * operators.barycentric[vertex];
                 }
             }
             Scheme::FirstOrderRing | Scheme::SecondOrderRing => {
@@ -388,6 +394,39 @@ impl<'a> Discretization<'a> {
                 .copy_from_slice(&data.laplacian[vertex * components..(vertex + 1) * components]);
         }
         Ok(())
+    }
+}
+
+impl Stabilisation {
+    /// What the lumped mass of each vertex of the domain is multiplied by, a length squared. It depends on the vertex's
+    /// connected part of the domain alone.
+    fn lengths(self, domain: &Domain<'_>) -> Vec<f64> {
+        let mesh = domain.mesh;
+        let cells = mesh.cells.iter().zip(&domain.inside).filter(|(_, inside)| **inside);
+        let cells: Vec<[u32; 3]> = cells.map(|(&cell, _)| cell).collect();
+        let parts = connectivity::components(&cells, mesh.points.len());
+        // Of each part the sum of its triangles' edges, their number, and its area.
+        let mut sums = vec![[0.0; 3]; parts.count];
+        for &cell in &cells {
+            let [a, b, c] = mesh.corners(cell);
+            let sum = &mut sums[parts.of_vertex[cell[0] as usize] as usize];
+            sum[0] += length(subtract(b, a)) + length(subtract(c, b)) + length(subtract(a, c));
+            sum[1] += 3.0;
+            sum[2] += length(area_vector([a, b, c])) / 2.0;
+        }
+        let of_part = |part: u32| {
+            let [edges, count, area] = sums[part as usize];
+            let edge = edges / count;
+            let other = match self.relaxation {
+                Relaxation::Linear => area.sqrt() / 20.0,
+                Relaxation::Quadratic => edge,
+            };
+            self.factor * edge * other
+        };
+        let parts = parts.of_vertex.iter();
+        parts
+            .map(|&part| if part == NONE { 0.0 } else { of_part(part) })
+            .collect()
     }
 }
 

@@ -1,7 +1,7 @@
 //! The settings of a mixed finite element computation in the typed form that it reads.
 
 use super::fields::FIELDS;
-use super::scheme::{Mass, Relaxation, Scheme};
+use super::scheme::{Mass, Relaxation, Scheme, Stabilisation};
 use crate::method::Failure;
 use crate::method::setting::fill;
 use serde::{Deserialize, Serialize};
@@ -166,6 +166,13 @@ impl Settings {
         match self.equation {
             Equation::Biharmonic => 2,
             Equation::Triharmonic => 3,
+        }
+    }
+
+    pub fn stabilisation(&self) -> Stabilisation {
+        Stabilisation {
+            relaxation: self.relaxation,
+            factor: self.stabilisation,
         }
     }
 

@@ -6,8 +6,9 @@
 //! because a Laplacian on part of a mesh is definite. There are as many negative eigenvalues as `v` and positive ones as
 //! `u`. Of order 3 `L` in the rows of `v` is negative, what is left for `w` is `S + M (-L)^-1 M`, positive, and then `u`
 //! is negative. One more unknown adds one eigenvalue of its sign, so every pivot has that sign, and `L J L^T` with the signs
-//! in `J` exists without pivoting. Where this does not hold, as for the unstabilised curve conditions of order 3, whose `w`
-//! on the boundary has no diagonal, the factorization says so.
+//! in `J` exists without pivoting. There are two exceptions, of which the factorization tells. The unstabilised curve
+//! conditions of order 3 leave `w` on the boundary without a diagonal. And on a closed surface with a single fixed point `v` is
+//! unknown everywhere, so that `L` is only semidefinite: if that point comes last, its `v` meets a zero pivot.
 //!
 //! Guaranteed: existence in exact arithmetic under these conditions. Not guaranteed: an error as small as with pivoting; the
 //! residual tells, and refinement halves it as long as it can.

@@ -1,6 +1,7 @@
 //! A computation from start to end: domain, conditions, system, solution, measurement.
 
 use super::domain::{Domain, Place};
+use super::factorization::Accuracy;
 use super::function::{self, Function};
 use super::metrics;
 use super::model::Model;
@@ -224,8 +225,7 @@ fn solve(
         scheme,
         settings.order(),
         settings.mass,
-        settings.relaxation,
-        settings.stabilisation,
+        settings.stabilisation(),
         data,
     )?;
     if scheme == Scheme::Unstabilised
@@ -237,7 +237,7 @@ fn solve(
     let mut system = System::new(&discretization, one_field, settings.solver, observer)?;
     go_on(observer)?;
     let solution = system.solve(&discretization, observer)?;
-    report.system(&system, solution.residual);
+    report.system(&system, solution.accuracy);
     report.count("solutions", data.components as u64);
     compare(&discretization, &solution.values, settings, report, observer)?;
     Ok(solution.values)
@@ -284,6 +284,9 @@ impl Observer for Quiet<'_> {
         self.0.stop()
     }
 }
+
+/// A larger share of rounding in a solution is told.
+const INACCURATE: f64 = 1e-6;
 
 /// What is reported of a computation.
 pub(super) struct Report {
@@ -368,8 +371,9 @@ impl Report {
         Ok(())
     }
 
-    pub(super) fn system(&mut self, system: &System, residual: f64) {
-        self.set("residual", residual);
+    pub(super) fn system(&mut self, system: &System, accuracy: Accuracy) {
+        self.set("residual", accuracy.backward);
+        self.set("rounding", accuracy.forward);
         self.set("unknowns", system.unknowns() as f64);
         self.set("matrix_entries", system.matrix_entries() as f64);
         self.set(
@@ -377,12 +381,26 @@ impl Report {
             system.factor_entries().map_or(f64::NAN, |entries| entries as f64),
         );
         self.count("factorizations", system.factorizations);
-        self.count("fallbacks", system.fallbacks);
-        if system.fallbacks > 0 {
-            self.notices
-                .push("the factorization with symmetric pivots broke down and LU took its place".to_string());
+        self.count("fallbacks", system.broken.len() as u64);
+        if !system.broken.is_empty() {
+            self.notices.push(format!(
+                "{} broke down and {} took its place",
+                system.broken.join(", then "),
+                system.solver()
+            ));
         }
-        self.reason = format!("solved by {} with relative residual {residual:.1e}", system.solver());
+        if !(accuracy.forward < INACCURATE) {
+            self.notices.push(format!(
+                "the system is so ill-conditioned that rounding alone may change the solution by {:.0e} of its size; look for \
+                 very thin triangles",
+                accuracy.forward
+            ));
+        }
+        self.reason = format!(
+            "solved by {} with backward error {:.1e}",
+            system.solver(),
+            accuracy.backward
+        );
     }
 
     pub(super) fn outcome(self, mesh: Vec<u8>) -> Outcome {

@@ -1,6 +1,6 @@
 //! Modelling of a surface: handles or patches, conditions, solution, and the smoothness of the seam.
 
-use super::domain::Domain;
+use super::domain::{self, Domain};
 use super::handles::{self, Roles};
 use super::hole;
 use super::model::Model;
@@ -21,6 +21,7 @@ use crate::optimize::{Iterate, Observer};
 /// # Errors
 /// For input that cannot be used, singular systems, and when the observer asks to stop.
 pub(super) fn run(mut model: Model, settings: &Settings, observer: &mut dyn Observer) -> Result<Outcome, Failure> {
+    domain::manifold(&model.mesh)?;
     if settings.fill != Fill::None {
         hole::fill(&mut model, settings.fill == Fill::All)?;
     }
@@ -89,8 +90,7 @@ pub(super) fn run(mut model: Model, settings: &Settings, observer: &mut dyn Obse
             scheme,
             order,
             settings.mass,
-            settings.relaxation,
-            settings.stabilisation,
+            settings.stabilisation(),
             &data,
         )?;
         let system = match &mut system {
@@ -109,7 +109,7 @@ pub(super) fn run(mut model: Model, settings: &Settings, observer: &mut dyn Obse
             *place = std::array::from_fn(|axis| value[axis] + if displacement { rest[axis] } else { 0.0 });
         }
         if frame == settings.frames {
-            report.system(system, solution.residual);
+            report.system(system, solution.accuracy);
             compare(
                 &discretization,
                 &solution.values,
@@ -121,7 +121,7 @@ pub(super) fn run(mut model: Model, settings: &Settings, observer: &mut dyn Obse
         observer.iterate(&Iterate {
             iteration: frame,
             energy: 0.0,
-            gradient_norm: solution.residual,
+            gradient_norm: solution.accuracy.backward,
             step: share,
         });
     }

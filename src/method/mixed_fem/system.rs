@@ -1,6 +1,6 @@
 //! A factorized system, one-field or mixed, that turns conditions into solutions.
 
-use super::factorization::{Factorization, singular};
+use super::factorization::{Accuracy, Factorization, singular};
 use super::mixed_system::{self, Numbering};
 use super::one_field::{self, OneField};
 use super::scheme::Discretization;
@@ -9,7 +9,7 @@ use super::signed_system::SignedSystem;
 use crate::method::Failure;
 use crate::optimize::Observer;
 
-/// A larger relative residual is taken as a breakdown of a factorization.
+/// A larger backward error is taken as a breakdown of a factorization.
 const BROKEN: f64 = 1e-9;
 
 /// A system ready for right-hand sides.
@@ -17,7 +17,8 @@ pub struct System {
     form: Form,
     factorization: Factorization,
     pub factorizations: u64,
-    pub fallbacks: u64,
+    /// Factorizations that broke down, by name, with the vertex where one is known.
+    pub broken: Vec<String>,
     /// The factorization that answers a breakdown.
     next: Option<Solver>,
 }
@@ -27,10 +28,10 @@ enum Form {
     Mixed(Numbering),
 }
 
-/// The field `u` at every vertex, and the relative residual of the system.
+/// The field `u` at every vertex, and how good the solution of the system is.
 pub struct Solution {
     pub values: Vec<f64>,
-    pub residual: f64,
+    pub accuracy: Accuracy,
 }
 
 impl System {
@@ -54,38 +55,43 @@ impl System {
                 form: Form::OneField,
                 factorization: Factorization::cholesky(system, &free)?,
                 factorizations: 1,
-                fallbacks: 0,
+                broken: Vec::new(),
                 next: None,
             });
         }
-        let mut fallbacks = 0;
+        let mut broken = Vec::new();
         if matches!(solver, Solver::Auto | Solver::Ldlt) {
             observer.phase("order");
             let (system, numbering) = SignedSystem::new(discretization);
             observer.phase("factorize");
-            if let Some(factorization) = Factorization::ldlt(system) {
-                return Ok(Self {
-                    form: Form::Mixed(numbering),
-                    factorization,
-                    factorizations: 1,
-                    fallbacks,
-                    next: (solver == Solver::Auto).then_some(Solver::Lblt),
-                });
-            }
+            let place = match Factorization::ldlt(system) {
+                Ok(factorization) => {
+                    return Ok(Self {
+                        form: Form::Mixed(numbering),
+                        factorization,
+                        factorizations: 1,
+                        broken,
+                        next: (solver == Solver::Auto).then_some(Solver::Lblt),
+                    });
+                }
+                Err(place) => place,
+            };
+            let vertex = numbering.vertex(place);
             if solver == Solver::Ldlt {
-                return Err(singular(
-                    "a pivot has not the sign that it should have; use solver = \"lblt\" or \"auto\"".to_string(),
-                ));
+                return Err(singular(format!(
+                    "a pivot at vertex {vertex} (counted from 0) has not the sign that it should have; use solver = \
+                     \"lblt\" or \"auto\""
+                )));
             }
-            fallbacks += 1;
+            broken.push(format!("ldlt at vertex {vertex} (counted from 0)"));
         }
         let pivoted = if solver == Solver::Auto { Solver::Lblt } else { solver };
         let (form, factorization) = pivoting(discretization, pivoted, observer)?;
         Ok(Self {
             form,
             factorization,
-            factorizations: 1 + fallbacks,
-            fallbacks,
+            factorizations: 1 + broken.len() as u64,
+            broken,
             next: (solver == Solver::Auto).then_some(Solver::Lu),
         })
     }
@@ -101,24 +107,24 @@ impl System {
     ) -> Result<Solution, Failure> {
         observer.phase("solve");
         let mut x = self.right_side(discretization);
-        let mut residual = self.factorization.solve(&mut x, discretization.components)?;
-        while let Some(next) = self.next.take_if(|_| !(residual < BROKEN)) {
+        let mut accuracy = self.factorization.solve(&mut x, discretization.components)?;
+        while let Some(next) = self.next.take_if(|_| !(accuracy.backward < BROKEN)) {
+            self.broken.push(self.solver().to_string());
             (self.form, self.factorization) = pivoting(discretization, next, observer)?;
             self.factorizations += 1;
-            self.fallbacks += 1;
             self.next = (next == Solver::Lblt).then_some(Solver::Lu);
             observer.phase("solve");
             x = self.right_side(discretization);
-            residual = self.factorization.solve(&mut x, discretization.components)?;
+            accuracy = self.factorization.solve(&mut x, discretization.components)?;
         }
-        if !(residual < BROKEN) {
-            return Err(broken(residual));
+        if !(accuracy.backward < BROKEN) {
+            return Err(broken(accuracy.backward));
         }
         let values = match &self.form {
             Form::OneField => one_field::field(discretization, &x),
             Form::Mixed(numbering) => numbering.field(discretization, &x, 0),
         };
-        Ok(Solution { values, residual })
+        Ok(Solution { values, accuracy })
     }
 
     fn right_side(&self, discretization: &Discretization<'_>) -> Vec<f64> {
@@ -171,7 +177,7 @@ fn broken(residual: f64) -> Failure {
     Failure {
         kind: "singular".to_string(),
         reason: format!(
-            "the system is singular or nearly so: its solution leaves the relative residual {residual:.1e}; with \
+            "the system is singular or nearly so: its solution leaves the backward error {residual:.1e}; with \
              condition = \"curve\" use curve = \"stabilised\", and look for very thin triangles"
         ),
     }

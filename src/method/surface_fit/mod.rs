@@ -1,5 +1,5 @@
 //! Surface fitting by Voronoi squared distance minimization: a mesh, or the control mesh of a Catmull-Clark surface, onto
-//! a target of triangles that need not hang together. Source: Nivoliers, Yan, Lévy 2012, Fitting polynomial surfaces to
+//! a target of triangles that need not hang together, or of points alone. Source: Nivoliers, Yan, Lévy 2012, Fitting polynomial surfaces to
 //! triangular meshes with Voronoi squared distance minimization.
 //!
 //! The stages: [`problem`] reads the model and scales it, [`sampling`] samples the target, [`objective`] is minimized by
@@ -9,14 +9,17 @@
 //! template of the wrong kind still ends with a verdict. Not guaranteed: that the fit reaches the target everywhere, for
 //! the connectivity of the template stays and minima are local.
 
+pub mod cloud;
 pub mod metrics;
 pub mod model;
 pub mod objective;
 pub mod outcome;
+pub mod preconditioner;
 pub mod problem;
 pub mod sampling;
 pub mod settings;
 pub mod trace;
+pub mod voxels;
 
 use super::model::ModelKind;
 use super::setting::Field;
@@ -42,11 +45,11 @@ impl Method for SurfaceFit {
     }
 
     fn version(&self) -> u32 {
-        1
+        2
     }
 
     fn summary(&self) -> &'static str {
-        "fits a mesh or a Catmull-Clark control mesh to a triangle surface, minimizing Voronoi squared distances"
+        "fits a mesh or a Catmull-Clark control mesh to a triangle surface or a cloud of points, minimizing Voronoi squared distances"
     }
 
     fn source(&self) -> &'static str {
@@ -130,7 +133,11 @@ pub fn run(problem: &Problem, settings: &Settings, observer: &mut dyn Observer) 
 
     observer.phase("sample");
     let (mut fitted, mut map) = fitted_mesh(&control, &creases, settings);
-    let mut samples = sampling::sample(&problem.target, fitted.points.len(), settings, observer)?;
+    let take_samples = |vertices: usize, observer: &mut dyn Observer| match &problem.cloud {
+        Some(points) => Ok(sampling::of_cloud(points)),
+        None => sampling::sample(&problem.target, vertices, settings, observer),
+    };
+    let mut samples = take_samples(fitted.points.len(), observer)?;
     let mut parts = objective::Parts::default();
     'rounds: for round in 0..=settings.refinements {
         if round > 0 {
@@ -138,11 +145,23 @@ pub fn run(problem: &Problem, settings: &Settings, observer: &mut dyn Observer) 
             let finer = subdivide(&control, &creases, 1);
             (control, creases) = (finer.surface, finer.creases);
             (fitted, map) = fitted_mesh(&control, &creases, settings);
-            samples = sampling::sample(&problem.target, fitted.points.len(), settings, observer)?;
+            samples = take_samples(fitted.points.len(), observer)?;
         }
         observer.phase("minimize");
         let first = if round == 0 { 0 } else { stages.len() - 1 };
-        let mut objective = FitObjective::new(&problem.target, &samples, &fitted, &map, settings, stages[first])?;
+        let target = match problem.cloud {
+            Some(_) => objective::Target::Cloud,
+            None => objective::Target::Surface(&problem.target),
+        };
+        let mut objective = FitObjective::new(
+            target,
+            &samples,
+            &fitted,
+            &map,
+            &control.points,
+            settings,
+            stages[first],
+        )?;
         let mut x = control.points.as_flattened().to_vec();
         for &stage in &stages[first..] {
             objective.set_stage(stage);

@@ -1,8 +1,10 @@
 //! What is minimized over the control points: both squared distance terms and the regularizer, with exact derivatives
 //! (equations 2 and 3 of the paper; `G(P) = F(M P)` of its algorithm 2).
 
+use super::cloud;
+use super::preconditioner::{Block, Preconditioner};
 use super::sampling::Samples;
-use super::settings::{Gradient, Settings, Stage, Terms};
+use super::settings::{Gradient, Preconditioning, Settings, Stage, Terms};
 use crate::geometry::point_tree::PointTree;
 use crate::geometry::restricted_voronoi::Compatibility;
 use crate::geometry::squared_distance::{Anisotropy, Derivative, Options, SquaredDistance, Wanted};
@@ -25,9 +27,19 @@ pub struct Parts {
     pub regularizer: f64,
 }
 
+/// What the second term runs over.
+#[derive(Clone, Copy)]
+pub enum Target<'a> {
+    Surface(&'a TriangleMesh),
+    /// The samples are all there is.
+    Cloud,
+}
+
 /// See the module.
 pub struct FitObjective<'a> {
     target: &'a TriangleMesh,
+    /// Of a cloud: the weight of a point, and the fitted mesh in triangles.
+    cloud: Option<(f64, TriangleMesh)>,
     samples: &'a Samples,
     sample_tree: PointTree,
     site_tree: PointTree,
@@ -50,22 +62,48 @@ pub struct FitObjective<'a> {
     areas: Vec<[f64; 3]>,
     turns: Vec<[f64; 3]>,
     control: Vec<[f64; 3]>,
+    preconditioner: Option<Preconditioner>,
+    blocks: Vec<Block>,
+    /// Unit normals of the target's triangles, zero where there is none.
+    target_normals: Vec<[f64; 3]>,
+    /// Evaluations since the preconditioner was made.
+    age: usize,
 }
 
+/// Evaluations after which the preconditioner is made anew.
+const AGE: usize = 5;
+
 impl<'a> FitObjective<'a> {
-    /// Of a fitted mesh whose points are `map` of the control points.
+    /// Of a fitted mesh whose points are `map` of points near `control`.
     ///
     /// # Errors
     /// Surfaces with an index out of range, which reading would have found.
     pub fn new(
-        target: &'a TriangleMesh,
+        target: Target<'a>,
         samples: &'a Samples,
         fitted: &Surface,
         map: &'a LinearMap,
+        control: &[[f64; 3]],
         settings: &Settings,
         stage: Stage,
     ) -> Result<FitObjective<'a>, Failure> {
+        static NO_SURFACE: TriangleMesh = TriangleMesh {
+            points: Vec::new(),
+            cells: Vec::new(),
+        };
         let cells = fitted.cut();
+        let (target, cloud) = match target {
+            Target::Surface(target) => (target, None),
+            Target::Cloud => {
+                let surface = TriangleMesh {
+                    points: fitted.points.clone(),
+                    cells: cells.clone(),
+                };
+                // All points together weigh as much as the surface does at the start.
+                let weight = surface.area() / samples.points.len().max(1) as f64;
+                (&NO_SURFACE, Some((weight, surface)))
+            }
+        };
         let prepared = |role: &str, points: &[[f64; 3]], cells: &[[u32; 3]]| {
             SquaredDistance::new(points, cells).map_err(|error| Failure {
                 kind: "invalid-input".to_string(),
@@ -78,10 +116,25 @@ impl<'a> FitObjective<'a> {
         for &end in edges.as_flattened() {
             degrees[end as usize] += 1.0;
         }
+        let preconditioner = match settings.preconditioner {
+            Preconditioning::None => None,
+            // Without one the minimization is slower and no less sound.
+            Preconditioning::Hessian => Preconditioner::new(map, &edges, &degrees, control).ok(),
+        };
+        let target_normals = target.cells.iter().map(|&cell| {
+            let area = area_vector(target.corners(cell));
+            let size = length(area);
+            if size > 0.0 { area.map(|x| x / size) } else { [0.0; 3] }
+        });
         Ok(FitObjective {
+            preconditioner,
+            blocks: vec![[0.0; 6]; count],
+            target_normals: target_normals.collect(),
+            age: AGE,
             to_target: prepared("template", &fitted.points, &cells)?,
             from_target: prepared("target", &target.points, &target.cells)?,
             target,
+            cloud,
             samples,
             sample_tree: PointTree::new(&samples.points),
             site_tree: PointTree::new(&fitted.points),
@@ -115,6 +168,58 @@ impl<'a> FitObjective<'a> {
 
     pub fn set_stage(&mut self, stage: Stage) {
         self.stage = stage;
+        self.age = AGE;
+    }
+
+    /// Makes the preconditioner anew at the points of the latest evaluation.
+    fn refresh(&mut self) {
+        let Some(preconditioner) = &mut self.preconditioner else {
+            return;
+        };
+        self.age = 0;
+        self.blocks.fill([0.0; 6]);
+        let stretch = self.stage.anisotropy.powi(2) - 1.0;
+        let blocks = &mut self.blocks;
+        let mut pull = |point: u32, area: f64, n: [f64; 3]| {
+            let along = stretch * area;
+            let block = &mut blocks[point as usize];
+            block[0] += area + along * n[0] * n[0];
+            block[1] += along * n[0] * n[1];
+            block[2] += along * n[0] * n[2];
+            block[3] += area + along * n[1] * n[1];
+            block[4] += along * n[1] * n[2];
+            block[5] += area + along * n[2] * n[2];
+        };
+        if self.terms.to_target() {
+            let (cells, normals) = (&self.cells, &self.samples.normals);
+            let diagram = self.to_target.diagram();
+            diagram.pieces(&self.points, &self.sample_tree, None, |piece| {
+                for vertex in cells[piece.triangle as usize] {
+                    pull(vertex, piece.area / 3.0, normals[piece.site as usize]);
+                }
+            });
+        }
+        if let (true, Some((weight, surface))) = (self.terms.from_target(), &mut self.cloud) {
+            surface.points.copy_from_slice(&self.points);
+            let weight = *weight;
+            cloud::distance(&self.samples.points, surface, weight, |cell, shares, _| {
+                for (vertex, share) in cell.into_iter().zip(shares) {
+                    pull(vertex, weight * share, [0.0; 3]);
+                }
+            });
+        } else if self.terms.from_target() {
+            let normals = &self.target_normals;
+            let diagram = self.from_target.diagram();
+            diagram.pieces(&self.target.points, &self.site_tree, None, |piece| {
+                pull(piece.site, piece.area, normals[piece.triangle as usize]);
+            });
+        }
+        if preconditioner
+            .refresh(self.map, &self.blocks, self.stage.regularization)
+            .is_err()
+        {
+            self.preconditioner = None;
+        }
     }
 
     /// Value at control points; the gradient by the fitted points is left in `self.gradient`.
@@ -148,7 +253,20 @@ impl<'a> FitObjective<'a> {
                 add_to(&mut self.gradient, &self.term, 1.0);
             }
         }
-        if self.terms.from_target() {
+        if let (true, Some((weight, surface))) = (self.terms.from_target(), &mut self.cloud) {
+            surface.points.copy_from_slice(&self.points);
+            let gradient = &mut self.gradient;
+            let weight = *weight;
+            parts.from_target = cloud::distance(&self.samples.points, surface, weight, |cell, shares, offset| {
+                if with_gradient {
+                    for (vertex, share) in cell.into_iter().zip(shares) {
+                        for axis in 0..3 {
+                            gradient[vertex as usize][axis] += 2.0 * weight * share * offset[axis];
+                        }
+                    }
+                }
+            });
+        } else if self.terms.from_target() {
             self.site_tree.set(&self.points);
             if compatible {
                 self.find_normals();
@@ -266,7 +384,21 @@ impl Objective for FitObjective<'_> {
         if value.is_finite() {
             self.map.apply_transposed(&self.gradient, &mut self.control);
             gradient.copy_from_slice(self.control.as_flattened());
+            self.age += 1;
         }
         value
+    }
+
+    fn is_preconditioned(&self) -> bool {
+        self.preconditioner.is_some()
+    }
+
+    fn precondition(&mut self, vector: &mut [f64]) {
+        if self.age >= AGE {
+            self.refresh();
+        }
+        if let Some(preconditioner) = &self.preconditioner {
+            preconditioner.apply(vector);
+        }
     }
 }

@@ -9,7 +9,7 @@ use crate::geometry::point_tree::PointTree;
 use crate::geometry::squared_distance::{Options, SquaredDistance, Wanted};
 use crate::mesh::format::{Cells, vtu};
 use crate::mesh::surface::Surface;
-use crate::mesh::{TriangleMesh, area_vector, length, subtract};
+use crate::mesh::{self, TriangleMesh, area_vector, length, subtract};
 use crate::method::Failure;
 use crate::metric::distance::{self, Distance, Hausdorff};
 use std::collections::BTreeMap;
@@ -41,7 +41,12 @@ pub fn measure(
     };
     let target = &problem.target;
     let triangulated = fitted.triangulated();
-    let hausdorff = distance::hausdorff(&triangulated, target).map_err(failure)?;
+    let no_surface = target.cells.is_empty();
+    let hausdorff = if no_surface {
+        to_points(&triangulated, &target.points)
+    } else {
+        distance::hausdorff(&triangulated, target).map_err(failure)?
+    };
     let mut metrics = BTreeMap::new();
     let mut set = |name: &str, value: f64| {
         metrics.insert(name.to_string(), value);
@@ -63,7 +68,16 @@ pub fn measure(
         100.0 * beyond / areas.iter().sum::<f64>()
     };
     set("spurious_area", far(&triangulated, forward));
-    set("missed_area", far(target, backward));
+    let missed = if no_surface {
+        let beyond = backward
+            .cells
+            .iter()
+            .filter(|&&distance| distance > FAR * hausdorff.diagonal);
+        100.0 * beyond.count() as f64 / target.points.len() as f64
+    } else {
+        far(target, backward)
+    };
+    set("missed_area", missed);
     let (crease, crease_mean) = crease_distances(target, &triangulated, settings.feature_angle);
     set("crease_distance", hausdorff.percent(crease));
     set("crease_distance_mean", hausdorff.percent(crease_mean));
@@ -87,11 +101,19 @@ pub fn measure(
     let area = triangulated.area();
     set(
         "approximation_error",
-        isotropic(&triangulated, samples)? / area - forward.rms.powi(2),
+        if problem.cloud.is_some() {
+            f64::NAN
+        } else {
+            isotropic(&triangulated, samples)? / area - forward.rms.powi(2)
+        },
     );
     set(
         "sample_spacing",
-        (target.area() / samples.points.len() as f64).sqrt() / hausdorff.diagonal,
+        if no_surface {
+            f64::NAN
+        } else {
+            (target.area() / samples.points.len() as f64).sqrt() / hausdorff.diagonal
+        },
     );
     set("samples", samples.points.len() as f64);
     set("vertices", fitted.points.len() as f64);
@@ -104,11 +126,11 @@ pub fn measure(
     };
     let (target_euler, closed) = euler(&as_surface);
     let (template_euler, _) = euler(&problem.template);
-    set("target_euler", target_euler as f64);
+    set("target_euler", if no_surface { f64::NAN } else { target_euler as f64 });
     set("template_euler", template_euler as f64);
 
     let mut notices = Vec::new();
-    if closed && target_euler != template_euler {
+    if closed && !no_surface && target_euler != template_euler {
         notices.push(format!(
             "the closed target has the Euler characteristic {target_euler}, the template {template_euler}: no template of \
              this connectivity can match it everywhere"
@@ -131,6 +153,39 @@ pub fn measure(
         metrics,
         notices,
     })
+}
+
+/// Distances to and from a cloud: of the fit's vertices to the nearest point, of every point to the fit.
+fn to_points(fit: &TriangleMesh, points: &[[f64; 3]]) -> Hausdorff {
+    let summary = |distances: &[f64], places: &[[f64; 3]], cells: Vec<f64>| {
+        let count = distances.len().max(1) as f64;
+        let (mut max, mut place) = (0.0, places.first().copied().unwrap_or_default());
+        for (&distance, &at) in distances.iter().zip(places) {
+            if distance > max {
+                (max, place) = (distance, at);
+            }
+        }
+        Distance {
+            max,
+            bound: max,
+            place,
+            mean: distances.iter().sum::<f64>() / count,
+            rms: (distances.iter().map(|x| x * x).sum::<f64>() / count).sqrt(),
+            cells,
+            samples: distances.len() as u64,
+        }
+    };
+    let tree = PointTree::new(points);
+    let near = |&x: &[f64; 3]| tree.nearest(x, None).map_or(f64::INFINITY, |(_, square)| square.sqrt());
+    let vertices: Vec<f64> = fit.points.iter().map(near).collect();
+    let corners = |cell: &[u32; 3]| cell.iter().fold(0.0, |most: f64, &v| most.max(vertices[v as usize]));
+    let cells = fit.cells.iter().map(corners).collect();
+    let each = distance::of_points(points, &ClosestPoint::new(fit));
+    Hausdorff {
+        forward: summary(&vertices, &fit.points, cells),
+        backward: summary(&each, points, each.clone()),
+        diagonal: mesh::diagonal(points),
+    }
 }
 
 /// The isotropic term from a surface to the samples.
@@ -235,7 +290,9 @@ fn side_by_side(problem: &Problem, fitted: &Surface, jacobians: &[f64], hausdorf
     triangles.extend(target.cells.iter().map(|cell| cell.map(|vertex| first + vertex)));
     let cut = &hausdorff.forward.cells;
     let mut distance: Vec<f64> = cut[..own].to_vec();
-    distance.extend(&hausdorff.backward.cells);
+    if !target.cells.is_empty() {
+        distance.extend(&hausdorff.backward.cells);
+    }
     distance.extend(
         cut[own..]
             .chunks(2)

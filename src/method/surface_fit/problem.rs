@@ -3,6 +3,8 @@
 //! The solver works in units in which the diagonal of the target's box is 1 and its centre the origin, so that weights do
 //! not depend on the units of the files.
 
+use super::model::VOXELS;
+use super::{cloud, voxels};
 use crate::mesh::format;
 use crate::mesh::generate::shape::generate_shape;
 use crate::mesh::generate::template::generate_template;
@@ -14,8 +16,10 @@ use crate::method::model::{LoadedModel, Part};
 /// See the module.
 #[derive(Clone, Debug)]
 pub struct Problem {
-    /// In the solver's units.
+    /// In the solver's units. Without triangles where a file has points alone.
     pub target: TriangleMesh,
+    /// In the solver's units: the points that are fitted where the target's surface is not to be used.
+    pub cloud: Option<Vec<[f64; 3]>>,
     /// In the solver's units.
     pub template: Surface,
     /// Centre and diagonal of the target's box in the units of its file.
@@ -44,16 +48,30 @@ impl Problem {
                 .ok_or_else(|| invalid(format!("the model has no `{role}`; give it a file or a generator")))
         };
         let mut notices = Vec::new();
+        let mut only_points = false;
         let target = match part("target")? {
             Part::Generated { generator, parameters } => {
-                generate_shape(generator, parameters).map_err(|message| invalid(format!("target: {message}")))?
+                let mut parameters = parameters.clone();
+                let cloud = parameters.as_object_mut().and_then(|table| table.remove("cloud"));
+                only_points = cloud.and_then(|cloud| cloud.as_bool()).unwrap_or(false);
+                generate_shape(generator, &parameters).map_err(|message| invalid(format!("target: {message}")))?
             }
-            Part::File { name, bytes, .. } => read(name, bytes, "target", &mut notices)?.triangulated(),
+            Part::File { name, bytes, .. } => match points(name, bytes, &mut notices)? {
+                Some(points) => TriangleMesh {
+                    points,
+                    cells: Vec::new(),
+                },
+                None => read(name, bytes, "target", &mut notices)?.triangulated(),
+            },
         };
         let Some([low, high]) = mesh::bounding_box(&target.points) else {
             return Err(invalid("target: there are no points".to_string()));
         };
         let template = match part("template")? {
+            Part::Generated { generator, parameters } if generator == VOXELS => {
+                let quads = parameters.get("quads").and_then(|quads| quads.as_u64()).unwrap_or(384);
+                voxels::template(&target, quads as usize).map_err(|message| invalid(format!("template: {message}")))?
+            }
             Part::Generated { generator, parameters } => generate_template(generator, parameters, [low, high])
                 .map_err(|message| invalid(format!("template: {message}")))?,
             Part::File {
@@ -68,7 +86,11 @@ impl Problem {
                 template
             }
         };
-        Problem::from_parts(target, template, notices)
+        let mut problem = Problem::from_parts(target, template, notices)?;
+        if only_points {
+            problem.use_points_alone();
+        }
+        Ok(problem)
     }
 
     /// The problem of a target and a template in the same units.
@@ -85,7 +107,18 @@ impl Problem {
             return Err(invalid("target: there are no points".to_string()));
         };
         let area = target.area();
-        if !(area > 1e-14 * diagonal * diagonal && diagonal.is_finite()) {
+        if target.cells.is_empty() {
+            if target.points.len() < 4 || !(diagonal > 0.0 && diagonal.is_finite()) {
+                return Err(invalid(format!(
+                    "target: {} points in a box of diagonal {diagonal:e} are no cloud to fit; give more points, or a surface",
+                    target.points.len()
+                )));
+            }
+            notices.push(format!(
+                "target: a cloud of {} points without normals; the anisotropy has no effect",
+                target.points.len()
+            ));
+        } else if !(area > 1e-14 * diagonal * diagonal && diagonal.is_finite()) {
             return Err(invalid(format!(
                 "target: {} triangles have the area {area:e} in a box of diagonal {diagonal:e}; give a surface with area",
                 target.cells.len()
@@ -105,13 +138,29 @@ impl Problem {
         for point in target.points.iter_mut().chain(&mut template.points) {
             *point = std::array::from_fn(|axis| (point[axis] - centre[axis]) / diagonal);
         }
+        let cloud = target.cells.is_empty().then(|| target.points.clone());
         Ok(Problem {
+            cloud,
             target,
             template,
             centre,
             diagonal,
             notices,
         })
+    }
+
+    /// Leaves the fit the centres of the target's triangles and nothing else; distances are still measured to the surface.
+    fn use_points_alone(&mut self) {
+        let centres = self.target.cells.iter().map(|&cell| {
+            let [a, b, c] = self.target.corners(cell);
+            std::array::from_fn(|axis| (a[axis] + b[axis] + c[axis]) / 3.0)
+        });
+        let points: Vec<[f64; 3]> = centres.collect();
+        self.notices.push(format!(
+            "target: fitted as a cloud of {} points without normals; the anisotropy has no effect",
+            points.len()
+        ));
+        self.cloud = Some(points);
     }
 
     /// Points in the units of the target's file.
@@ -121,6 +170,29 @@ impl Problem {
             .map(|point| std::array::from_fn(|axis| self.centre[axis] + self.diagonal * point[axis]))
             .collect()
     }
+}
+
+/// The points of a file that holds nothing else.
+fn points(name: &str, bytes: &[u8], notices: &mut Vec<String>) -> Result<Option<Vec<[f64; 3]>>, Failure> {
+    if let Some(points) = cloud::read(name, bytes).map_err(|message| invalid(format!("target: {message}")))? {
+        return Ok(Some(points));
+    }
+    let content = format::read(name, bytes).map_err(|error| invalid(format!("target: {error}")))?;
+    let cells = content.cells();
+    if content.points.is_empty() || cells.count() > 0 {
+        return Ok(None);
+    }
+    if let Some(index) = content
+        .points
+        .iter()
+        .position(|point| point.iter().any(|x| !x.is_finite()))
+    {
+        return Err(invalid(format!(
+            "target: {name}: point {index} (counted from 0) has a coordinate that is not finite"
+        )));
+    }
+    notices.extend(content.notices.iter().map(|notice| format!("target: {notice}")));
+    Ok(Some(content.points))
 }
 
 fn read(name: &str, bytes: &[u8], role: &str, notices: &mut Vec<String>) -> Result<Surface, Failure> {

@@ -16,7 +16,7 @@ const PLENTY: usize = 16;
 #[derive(Clone, Debug)]
 pub struct Samples {
     pub points: Vec<[f64; 3]>,
-    /// Unit vectors.
+    /// Unit vectors; zero for a cloud.
     pub normals: Vec<[f64; 3]>,
     pub sampling: Sampling,
 }
@@ -88,6 +88,15 @@ pub fn sample(
         normals: found.iter().map(|sample| sample.normal).collect(),
         sampling: Sampling::Tessellation,
     })
+}
+
+/// A cloud as samples without normals.
+pub fn of_cloud(points: &[[f64; 3]]) -> Samples {
+    Samples {
+        points: points.to_vec(),
+        normals: vec![[0.0; 3]; points.len()],
+        sampling: Sampling::Facets,
+    }
 }
 
 /// Passes on the wish to stop and keeps the iterates of the sampling to itself.

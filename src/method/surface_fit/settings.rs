@@ -47,15 +47,17 @@ pub static FIELDS: &[Field] = &[
             Kind::List(&Kind::Number { min: 1e-3, max: 1e6 }),
         ]),
         default: Default::Absent,
-        doc: "Factor s along the target's normals (section 3.6 of the paper), or a list with one entry a stage; the last \
-              entry of a shorter list holds on. Preset best: [1, 50], paper: 50.",
+        doc: "Factor s along the target's normals (section 3.6 of the paper): a list with one entry a stage, the last entry \
+              of a shorter list holding on; or a number, which the preset's stages then end with and do not exceed \
+              before. Preset best: [1, 1, 10, 50], paper: 50.",
     },
     Field {
         name: "regularization",
         kind: Kind::OneOf(&[NUMBERS, Kind::List(&NUMBERS)]),
         default: Default::Absent,
-        doc: "Factor lambda of |L X|^2 with the graph Laplacian L of the fitted mesh X, the target scaled to diagonal 1; or a \
-              list with one entry a stage. Preset best: [0.0002, 0.0002], paper: 0.0002.",
+        doc: "Factor lambda of |L X|^2 with the graph Laplacian L of the fitted mesh X, the target scaled to diagonal 1: a \
+              list with one entry a stage, or a number, which the preset's stages end with and do not go below \
+              before. Preset best: [0.02, 0.002, 0.002, 0.0002], paper: 0.0002.",
     },
     Field {
         name: "gradient",
@@ -153,13 +155,25 @@ pub static FIELDS: &[Field] = &[
         ]),
         default: Default::Absent,
         doc: "A stage is done when one step lowers the energy by less than this share of it; or a list with one entry a \
-              stage. Preset best: [0.003, 0.0003], paper: 0.0001.",
+              stage. Preset best: [0.001, 0.0003, 0.001, 0.0003], paper: 0.0001.",
     },
     Field {
         name: "gradient_tolerance",
         kind: Kind::Number { min: 0.0, max: 1e12 },
         default: Default::Number(1e-9),
         doc: "A stage is done when the Euclidean norm of the gradient is below this.",
+    },
+    Field {
+        name: "preconditioner",
+        kind: Kind::Choice(&[
+            (
+                "hessian",
+                "both terms with the cells held still, and the regularizer; made anew every five evaluations",
+            ),
+            ("none", "plain L-BFGS, as in the paper"),
+        ]),
+        default: Default::Absent,
+        doc: "The model of the Hessian that L-BFGS starts its own from. Preset best: hessian, paper: none.",
     },
     Field {
         name: "memory",
@@ -209,6 +223,13 @@ pub enum Sampling {
     Tessellation,
 }
 
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Preconditioning {
+    Hessian,
+    None,
+}
+
 /// The settings with nothing left open.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Settings {
@@ -229,6 +250,7 @@ pub struct Settings {
     pub iteration_limit: u64,
     pub change_tolerance: Vec<f64>,
     pub gradient_tolerance: f64,
+    pub preconditioner: Preconditioning,
     pub memory: usize,
     pub feature_angle: f64,
 }
@@ -240,6 +262,10 @@ pub struct Stage {
     pub regularization: f64,
     pub change_tolerance: f64,
 }
+
+/// The schedule of the preset `best`: a stiff mesh is drawn near first, then let loose.
+const ANISOTROPY: [f64; 4] = [1.0, 1.0, 10.0, 50.0];
+const REGULARIZATION: [f64; 4] = [2e-2, 2e-3, 2e-3, 2e-4];
 
 /// The settings that may have one entry a stage.
 const SCHEDULES: [&str; 3] = ["anisotropy", "regularization", "change_tolerance"];
@@ -265,17 +291,34 @@ impl Settings {
             }
         }
         let paper = table.remove("preset").is_some_and(|preset| preset == "paper");
+        // A number alone is where the schedule leads, unless the other one is a list with stages of its own.
+        let listed = |table: &Map<String, Value>, name: &str| table.get(name).is_some_and(Value::is_array);
+        if !paper && !listed(&table, "anisotropy") && !listed(&table, "regularization") {
+            for (name, schedule) in [("anisotropy", ANISOTROPY), ("regularization", REGULARIZATION)] {
+                if let Some(last) = table.get(name).and_then(Value::as_f64) {
+                    let rises = schedule[0] < schedule[schedule.len() - 1];
+                    let mut stages = schedule.map(|entry| if rises { entry.min(last) } else { entry.max(last) });
+                    stages[schedule.len() - 1] = last;
+                    table.insert(name.to_string(), Value::from(&stages[..]));
+                }
+            }
+        }
         let mut preset = |name: &str, best: Value, paper_value: Value| {
             table.entry(name).or_insert(if paper { paper_value } else { best });
         };
-        preset("anisotropy", Value::from(vec![1.0, 50.0]), Value::from(vec![50.0]));
-        preset("regularization", Value::from(vec![2e-4, 2e-4]), Value::from(vec![2e-4]));
+        preset("anisotropy", Value::from(&ANISOTROPY[..]), Value::from(vec![50.0]));
+        preset(
+            "regularization",
+            Value::from(&REGULARIZATION[..]),
+            Value::from(vec![2e-4]),
+        );
         preset(
             "change_tolerance",
-            Value::from(vec![3e-3, 3e-4]),
+            Value::from(vec![1e-3, 3e-4, 1e-3, 3e-4]),
             Value::from(vec![1e-4]),
         );
         preset("limit", Value::from(true), Value::from(false));
+        preset("preconditioner", Value::from("hessian"), Value::from("none"));
         for name in SCHEDULES {
             if let Some(value) = table.get_mut(name)
                 && value.is_number()

@@ -5,9 +5,9 @@
 //! would fall. A function shared by several elements counts in equal parts.
 
 use super::fit::Fit;
-use super::invalid;
 use super::settings::Adaptive;
 use super::surface_energy::SurfaceEnergy;
+use super::{invalid, quality};
 use crate::fem::boundary::Boundary;
 use crate::fem::space::Space;
 use crate::method::Failure;
@@ -31,8 +31,15 @@ pub(super) fn raised(fit: &Fit<'_>, adaptive: &Adaptive) -> Result<Option<Vec<us
     let volume = fit.volume_energy(&space)?;
     let mut gradient = vec![0.0; x.len()];
     if !volume.add_gradient(&x, fit.lambda, &mut gradient).value.is_finite() {
-        // The finer quadrature found an inversion between the points of the coarser one.
-        return Ok(None);
+        // The finer quadrature found an inversion between the points of the coarser one: those elements need their new
+        // functions most, and the next stage untangles them with these.
+        let quality = quality::quality(&space, &fit.references, &x)?;
+        let failing = |cell: usize| !(quality.least_determinant[cell] > 0.0);
+        let any = (0..orders.len()).any(failing);
+        let raised = (0..orders.len()).map(|cell| if failing(cell) || !any { up[cell] } else { orders[cell] });
+        let mut result: Vec<usize> = raised.collect();
+        smooth(fit, &mut result);
+        return Ok((result != *orders).then_some(result));
     }
     let boundary = Boundary::new(&fit.volume, &fit.topology, &space, fit.intervals(highest));
     let mut samples = Vec::new();
@@ -102,7 +109,12 @@ pub(super) fn raised(fit: &Fit<'_>, adaptive: &Adaptive) -> Result<Option<Vec<us
         sum += indicator;
         result[cell] = up[cell];
     }
-    // Neighbours whose orders differ by more than two waste functions on their shared face.
+    smooth(fit, &mut result);
+    Ok((result != *orders).then_some(result))
+}
+
+/// Raises orders until no two neighbours differ by more than two: more would waste functions on their shared face.
+fn smooth(fit: &Fit<'_>, result: &mut [usize]) {
     loop {
         let mut changed = false;
         for face in &fit.topology.faces {
@@ -120,5 +132,4 @@ pub(super) fn raised(fit: &Fit<'_>, adaptive: &Adaptive) -> Result<Option<Vec<us
             break;
         }
     }
-    Ok((result != *orders).then_some(result))
 }

@@ -13,7 +13,7 @@ use crate::fem::space::{Kind, Space};
 use crate::fem::volume_energy::VolumeEnergy;
 use crate::linalg::vector3::Columns;
 use crate::mesh::mixed::{MixedMesh, Topology};
-use crate::mesh::{self, bounding_box};
+use crate::mesh::{self, TriangleMesh, bounding_box};
 use crate::method::{Failure, Outcome};
 use crate::optimize::{Observer, StopReason};
 use std::collections::BTreeMap;
@@ -102,7 +102,7 @@ impl<'a> Fit<'a> {
                 "the template has the volume {own_volume:e}; its elements are inside out or flat"
             )));
         }
-        check_target(&target, &mut notices)?;
+        check_target(&target, &template_surface, &mut notices)?;
         let scale = Scale::of(&target, &template_surface, own_volume);
         let (references, whole) = match &shell {
             None => {
@@ -309,7 +309,7 @@ pub(super) fn interrupted(stop: StopReason) -> bool {
 }
 
 /// Names what is wrong with a target surface; an inside-out one is turned, an open or damaged one only mentioned.
-fn check_target(target: &Target, notices: &mut Vec<String>) -> Result<(), Failure> {
+fn check_target(target: &Target, template: &TriangleMesh, notices: &mut Vec<String>) -> Result<(), Failure> {
     if target.surface.cells.is_empty() {
         notices.push(format!(
             "the target is a cloud of {} points without normals",
@@ -334,8 +334,29 @@ fn check_target(target: &Target, notices: &mut Vec<String>) -> Result<(), Failur
              template's where its own make no sense",
             sides.len()
         ));
-    } else if target.surface.enclosed_volume() < 0.0 {
-        notices.push("the target is inside out; distances do not depend on it".to_string());
+    } else {
+        if target.surface.enclosed_volume() < 0.0 {
+            notices.push("the target is inside out; distances do not depend on it".to_string());
+        }
+        let [wanted, given] = [&target.surface, template].map(euler_characteristic);
+        if wanted != given {
+            notices.push(format!(
+                "the template's boundary has the Euler characteristic {given}, the target {wanted}: as they differ in holes or \
+                 pieces, no fit is one-to-one; carve the template accordingly"
+            ));
+        }
     }
     Ok(())
+}
+
+/// Vertices less edges plus triangles, without points that no triangle uses.
+fn euler_characteristic(surface: &TriangleMesh) -> i64 {
+    let mut vertices: Vec<u32> = surface.cells.iter().flatten().copied().collect();
+    vertices.sort_unstable();
+    vertices.dedup();
+    let sides = surface.cells.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
+    let mut edges: Vec<[u32; 2]> = sides.map(|[a, b]| [a.min(b), a.max(b)]).collect();
+    edges.sort_unstable();
+    edges.dedup();
+    vertices.len() as i64 - edges.len() as i64 + surface.cells.len() as i64
 }

@@ -282,7 +282,12 @@ static KIND: LazyLock<ModelKind> = LazyLock::new(|| {
         ),
         shape(
             "block",
-            vec![],
+            vec![Field {
+                name: "bend",
+                kind: Kind::Number { min: -1.0, max: 1.0 },
+                default: Default::Number(0.0),
+                doc: "Second derivative, halved, of the bow that the block is bent to.",
+            }],
             "A cuboid with a step: flat faces, sharp edges, one of them concave.",
         ),
         shape(

@@ -38,6 +38,10 @@ pub fn generate(name: &str, parameters: &Value, wanted: usize) -> TriangleMesh {
         "block" => {
             let mut surface = quads_to_triangles(subdivided([3, 2, 2], |[i, _, k]| !(i > 0 && k == 1), wanted, false));
             stretch(&mut surface, [1.0, 1.0, 0.7]);
+            let bend = number("bend", 0.0);
+            for point in &mut surface.points {
+                point[2] += bend * (point[0] - 1.5) * (point[0] - 1.5);
+            }
             surface
         }
         "joint" => {

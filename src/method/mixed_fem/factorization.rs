@@ -129,32 +129,38 @@ impl Factorization {
         let dimension = self.dimension();
         let wanted = right.to_vec();
         self.0.apply(right, count)?;
+        let row_sums = self.0.multiply_magnitudes(&vec![1.0; dimension]);
         let mut found = Accuracy::default();
         for column in 0..count {
             let range = column * dimension..(column + 1) * dimension;
             let (wanted, x) = (&wanted[range.clone()], &mut right[range]);
-            let (mut residual, mut backward) = self.backward_error(x, wanted);
-            let mut forward = f64::NAN;
+            let (mut residual, mut sizes, mut backward) = self.backward_error(x, wanted, &row_sums);
             for _ in 0..REFINEMENTS {
                 if !backward.is_finite() {
                     break;
                 }
                 let mut step = residual.clone();
                 self.0.apply(&mut step, 1)?;
-                let size = largest(x);
-                forward = if size > 0.0 { largest(&step) / size } else { 0.0 };
                 let better: Vec<f64> = x.iter().zip(&step).map(|(x, step)| x + step).collect();
-                let (next, less) = self.backward_error(&better, wanted);
+                let (next, next_sizes, less) = self.backward_error(&better, wanted, &row_sums);
                 if !(less < backward) {
                     break;
                 }
                 let halved = less < 0.5 * backward;
                 x.copy_from_slice(&better);
-                (residual, backward) = (next, less);
+                (residual, sizes, backward) = (next, next_sizes, less);
                 if !halved || backward <= f64::EPSILON {
                     break;
                 }
             }
+            // What rounding of the coefficients alone does, with signs as good as random.
+            for (row, size) in sizes.iter_mut().enumerate() {
+                let sign = (row as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 63;
+                *size *= if sign == 0 { f64::EPSILON } else { -f64::EPSILON };
+            }
+            self.0.apply(&mut sizes, 1)?;
+            let size = largest(x);
+            let forward = if size > 0.0 { largest(&sizes) / size } else { 0.0 };
             found = Accuracy {
                 backward: larger(found.backward, backward),
                 forward: larger(found.forward, forward),
@@ -163,20 +169,20 @@ impl Factorization {
         Ok(found)
     }
 
-    /// The residual `b - A x`, and the smallest relative change of every coefficient of `A` and `b` that makes `x` exact: the
+    /// The residual `b - A x`, `|A| |x| + |b|` row by row, and the smallest relative change of every coefficient of `A` and `b` that makes `x` exact: the
     /// maximum of `|b - A x| / (|A| |x| + |b|)` over the rows (Oettli and Prager 1964). Rows whose denominator is
     /// rounding itself are measured against the size of the row and of `x` (Arioli, Demmel and Duff 1989).
-    fn backward_error(&self, x: &[f64], wanted: &[f64]) -> (Vec<f64>, f64) {
+    fn backward_error(&self, x: &[f64], wanted: &[f64], row_sums: &[f64]) -> (Vec<f64>, Vec<f64>, f64) {
         let image = self.0.multiply(x);
         let residual: Vec<f64> = wanted.iter().zip(&image).map(|(b, image)| b - image).collect();
         let magnitudes: Vec<f64> = x.iter().map(|x| x.abs()).collect();
-        let sizes = self.0.multiply_magnitudes(&magnitudes);
-        let rows = self.0.multiply_magnitudes(&vec![largest(x); x.len()]);
+        let mut sizes = self.0.multiply_magnitudes(&magnitudes);
+        sizes.iter_mut().zip(wanted).for_each(|(size, b)| *size += b.abs());
+        let norm = largest(x);
         let error = (0..x.len())
             .map(|row| {
-                let size = sizes[row] + wanted[row].abs();
-                let tiny = 1e3 * f64::EPSILON * (rows[row] + wanted[row].abs());
-                let size = if size > tiny { size } else { sizes[row] + rows[row] };
+                let (size, whole) = (sizes[row], row_sums[row] * norm + wanted[row].abs());
+                let size = if size > 1e3 * f64::EPSILON * whole { size } else { whole };
                 if residual[row] == 0.0 {
                     0.0
                 } else {
@@ -184,7 +190,7 @@ impl Factorization {
                 }
             })
             .fold(0.0, larger);
-        (residual, error)
+        (residual, sizes, error)
     }
 }
 
@@ -193,7 +199,8 @@ impl Factorization {
 pub struct Accuracy {
     /// Componentwise relative backward error; not-a-number where the solution is not finite.
     pub backward: f64,
-    /// Size of the last step of refinement against that of the solution: an estimate of what rounding did to it.
+    /// How much relative changes of all coefficients by the rounding unit, with random signs, change the solution against its
+    /// size: an estimate of what rounding may have done to it.
     pub forward: f64,
 }
 

@@ -60,7 +60,8 @@ pub static ALL: &[Metric] = &[
         "",
         Some(0.0),
         Better::Neither,
-        "Size of the last step of refinement against that of the solution: an estimate of what rounding did to it.",
+        "How much changing every coefficient by the rounding unit, with random signs, changes the solution against its size: an \
+         estimate of what rounding may have done to it.",
     ),
     metric(
         "difference",

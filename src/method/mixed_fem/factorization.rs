@@ -14,8 +14,9 @@ use super::signed_system::SignedSystem;
 use crate::linalg::sparse::BlockCholesky;
 use crate::method::Failure;
 
-/// Refinement, one step at least, ends when the backward error is down to rounding or does not halve, and after this many
-/// steps at the latest.
+/// A backward error that more steps in the same precision do not improve.
+const ROUNDING: f64 = 4.0 * f64::EPSILON;
+/// Refinement ends when the backward error is down to rounding or does not halve, and after this many steps at the latest.
 const REFINEMENTS: usize = 4;
 
 /// A symmetric matrix with a factor that solves for it.
@@ -136,7 +137,7 @@ impl Factorization {
             let (wanted, x) = (&wanted[range.clone()], &mut right[range]);
             let (mut residual, mut sizes, mut backward) = self.backward_error(x, wanted, &row_sums);
             for _ in 0..REFINEMENTS {
-                if !backward.is_finite() {
+                if !backward.is_finite() || backward <= ROUNDING {
                     break;
                 }
                 let mut step = residual.clone();
@@ -149,7 +150,7 @@ impl Factorization {
                 let halved = less < 0.5 * backward;
                 x.copy_from_slice(&better);
                 (residual, sizes, backward) = (next, next_sizes, less);
-                if !halved || backward <= f64::EPSILON {
+                if !halved {
                     break;
                 }
             }
@@ -169,9 +170,9 @@ impl Factorization {
         Ok(found)
     }
 
-    /// The residual `b - A x`, `|A| |x| + |b|` row by row, and the smallest relative change of every coefficient of `A` and `b` that makes `x` exact: the
-    /// maximum of `|b - A x| / (|A| |x| + |b|)` over the rows (Oettli and Prager 1964). Rows whose denominator is
-    /// rounding itself are measured against the size of the row and of `x` (Arioli, Demmel and Duff 1989).
+    /// The residual `b - A x`, `|A| |x| + |b|` row by row, and the smallest relative change of every coefficient of `A` and `b`
+    /// that makes `x` exact: the maximum of `|b - A x| / (|A| |x| + |b|)` over the rows (Oettli and Prager 1964). Rows whose
+    /// denominator is rounding itself are measured against the size of the row and of `x` (Arioli, Demmel and Duff 1989).
     fn backward_error(&self, x: &[f64], wanted: &[f64], row_sums: &[f64]) -> (Vec<f64>, Vec<f64>, f64) {
         let image = self.0.multiply(x);
         let residual: Vec<f64> = wanted.iter().zip(&image).map(|(b, image)| b - image).collect();

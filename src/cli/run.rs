@@ -302,7 +302,7 @@ pub(super) fn write_report(
             .count();
         if unmet > 0 {
             say(&format!(
-                "{unmet} of {} expectations are not met; `vargeo check` says which",
+                "{unmet} of {} expectations are not met; the page says which",
                 written.verdicts.len()
             ));
         }

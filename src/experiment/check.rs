@@ -108,9 +108,13 @@ fn one_of<'a>(words: impl Iterator<Item = &'a str>) -> String {
     }
 }
 
-/// The singular of a field's name, for `unknown claim "VM9"`.
+/// The singular of a field's name, for `unknown claim "VM9"`. A basis, a radius and an axis are singular already.
 fn noun(name: &str) -> &str {
-    name.rsplit('.').next().unwrap_or(name).trim_end_matches('s')
+    let last = name.rsplit('.').next().unwrap_or(name);
+    match last.strip_suffix('s') {
+        Some(singular) if !singular.ends_with(['i', 'u', 's']) => singular,
+        _ => last,
+    }
 }
 
 impl Checker {

@@ -21,10 +21,28 @@ pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Opti
         .map(|(candidate, _, _)| candidate)
 }
 
+/// The known names of which a word is the given one: `surface` is in `g1-surface` and in `surface-fit`.
+fn containing<'a>(name: &str, known: &[&'a str]) -> Vec<&'a str> {
+    let word = |candidate: &&&str| {
+        candidate
+            .split(['-', '_', '.'])
+            .any(|part| part.eq_ignore_ascii_case(name))
+    };
+    known.iter().filter(word).copied().collect()
+}
+
 /// `did you mean "stretch"?`, or the known names when none is near.
 pub fn suggestion<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<String> {
     let known: Vec<&str> = known.into_iter().collect();
-    match nearest(name, known.iter().copied()) {
+    let several = containing(name, &known);
+    if let [first, .., last] = several[..] {
+        let between = several[1..several.len() - 1].iter().map(|name| format!(", \"{name}\""));
+        return Some(format!(
+            "did you mean \"{first}\"{} or \"{last}\"?",
+            between.collect::<String>()
+        ));
+    }
+    match nearest(name, known.iter().copied()).or(several.first().copied()) {
         Some(name) => Some(format!("did you mean \"{name}\"?")),
         None => list(&known),
     }

@@ -27,6 +27,8 @@ pub struct Fit {
     pub y: String,
     /// Points within the window, by x.
     pub points: Vec<(f64, f64)>,
+    /// How many of the points are of jobs that did not converge.
+    pub unconverged: usize,
     pub line: Option<Line>,
     /// Rate between the last two x in the direction in which the jobs go, the mean of the seeds where there are several.
     pub last_pair: Option<f64>,
@@ -89,6 +91,7 @@ fn fit_series(rate: &Rate, rows: &[Row]) -> Vec<Fit> {
         x: f64,
         y: f64,
         seed: String,
+        converged: bool,
     }
     let mut series: Vec<(String, Vec<Point>, usize)> = Vec::new();
     for row in rows.iter().filter(|row| row.matches(&rate.condition)) {
@@ -116,6 +119,7 @@ fn fit_series(rate: &Rate, rows: &[Row]) -> Vec<Fit> {
                         x,
                         y,
                         seed: seeds.join(" "),
+                        converged: !row.remarkable(),
                     });
                 }
             }
@@ -153,6 +157,7 @@ fn fit_series(rate: &Rate, rows: &[Row]) -> Vec<Fit> {
                 y: rate.y.clone(),
                 line: fit(&pairs),
                 last_pair: last,
+                unconverged: points.iter().filter(|point| !point.converged).count(),
                 points: pairs,
                 spread,
                 window: rate.window,
@@ -232,6 +237,9 @@ impl Fit {
                 round(low, 4).plain(),
                 round(high, 4).plain()
             ));
+        }
+        if self.unconverged > 0 {
+            text.push_str(&format!("; {} of them did not converge", self.unconverged));
         }
         if self.left_out > 0 {
             text.push_str(&format!(

@@ -80,6 +80,14 @@ impl Row {
         }
     }
 
+    /// Whether a job on one thread had the machine's other jobs kept away and still waited: its time is not its own.
+    pub fn waited(&self) -> bool {
+        let measurement = &self.record.measurement;
+        let times = (median(&measurement.wall_seconds), median(&measurement.cpu_seconds));
+        let waited = matches!(times, (Some(wall), Some(cpu)) if wall > 1.25 * cpu + 0.1);
+        measurement.exclusive && measurement.threads == 1 && waited
+    }
+
     /// Whether the method returned an outcome.
     pub fn done(&self) -> bool {
         self.record.result.status == Status::Done
@@ -98,13 +106,16 @@ impl Row {
         })
     }
 
-    /// The values of these axes as one text, such as `ball, stretch`.
+    /// The values of these axes as one text, such as `ball, stretch, order 2`: a number says nothing without its axis.
     pub fn labels(&self, axes: &[String]) -> String {
-        let parts: Vec<String> = axes
-            .iter()
-            .map(|axis| self.axis(axis).map_or_else(String::new, label))
-            .collect();
-        parts.join(", ")
+        let part = |axis: &String| match self.axis(axis) {
+            Some(value @ (Value::Number(_) | Value::Bool(_) | Value::Array(_))) => {
+                let name = axis.rsplit('.').next().unwrap_or(axis);
+                format!("{} {}", name.replace('_', " "), label(value))
+            }
+            value => value.map_or_else(String::new, label),
+        };
+        axes.iter().map(part).collect::<Vec<_>>().join(", ")
     }
 }
 

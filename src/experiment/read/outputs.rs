@@ -126,7 +126,11 @@ fn plot(checker: &mut Checker, node: &Node, context: &Context<'_>, names: &mut N
     let (x, y) = coordinates(checker, &found, context, true);
     let series = series(checker, &found, context, x.as_deref());
     let (x, y) = (x?, y?);
-    mingled(checker, &found, context, &condition, &x, &series);
+    // A trace is a line of one job.
+    let is_trace = |name: &str| context.method.traces().iter().any(|(trace, _)| *trace == name);
+    if !(is_trace(&x) && is_trace(&y)) {
+        mingled(checker, &found, context, &condition, &x, &series);
+    }
     let name = found.text("name").unwrap_or_else(|| format!("{y}-{x}"));
     unique(checker, content.get("name"), node, &name, "plot", names);
     let log = found.text("log").unwrap_or_default();
@@ -269,16 +273,12 @@ fn mingled(
     let Some(entry) = found.nodes.get("series") else {
         return;
     };
-    // A trace is a line of one job.
-    if context.method.traces().iter().any(|(trace, _)| *trace == x) {
-        return;
-    }
     let refining = refining(context.axes, x);
     let measured = context.axes.find(x).is_none();
     let seed = |name: &str| name == "seed" || name.ends_with(".seed");
     let left_out = |axis: &&Known| {
-        !(series.contains(&axis.name) || refining.contains(&axis.name) || seed(&axis.name))
-            && !(measured && numeric(axis))
+        let told = series.contains(&axis.name) || refining.contains(&axis.name);
+        !(told || seed(&axis.name) || measured && numeric(axis))
     };
     let jobs = || context.points.iter().filter(|point| grid::matches(condition, point));
     let differ = |name: &str| {

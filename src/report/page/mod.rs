@@ -347,7 +347,9 @@ fn jobs(rows: &[Row]) -> String {
         let mut timed = number::moment(measurement.started);
         if !timed.is_empty() {
             let runs = measurement.wall_seconds.len();
-            let alone = if measurement.exclusive {
+            let alone = if row.waited() {
+                "alone, but the machine was busy"
+            } else if measurement.exclusive {
                 "alone"
             } else {
                 "beside others"

@@ -3,7 +3,7 @@
 //! Coordinates are whole numbers on a canvas 3200 wide: an SVG scales them through its viewBox, a bitmap is averaged down.
 
 use super::axis::Kind;
-use super::{Chart, Point};
+use super::{Chart, Look, Point};
 use plotters::coord::Shift;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
@@ -200,7 +200,8 @@ fn layout(chart: &Chart) -> Layout {
     };
     Layout {
         left: 130 + y_labels + 40,
-        right: WIDTH as i32 - if named { names + 260 } else { 60 },
+        // A reader's typeface may be wider than the embedded one.
+        right: WIDTH as i32 - if named { names * 6 / 5 + 230 } else { 60 },
         top: 50,
         bottom: height(chart) as i32 - x_labels - 190,
         upright_names,
@@ -254,14 +255,14 @@ impl<B: DrawingBackend> Pen<'_, B> {
                 _ => 0,
             };
             let at = |point: &Point| (x(point.x) + offset, y(point.y));
-            let role = Role::Series(index);
+            let (role, shape) = (Role::Series(one.look.colour), one.look.shape);
             let places: Vec<(i32, i32)> = one.points.iter().map(at).collect();
             for point in one.points.iter().filter(|point| point.high > point.low) {
                 let across = x(point.x) + offset;
                 self.line(vec![(across, y(point.low)), (across, y(point.high))], role.stroke(5))?;
             }
             if one.joined {
-                self.dashed(&places, dashes(index), role.stroke(9))?;
+                self.dashed(&places, dashes(shape), role.stroke(9))?;
             } else if chart.series.len() == 1 && chart.y.kind == Kind::Linear && chart.y.low <= 0.0 {
                 for place in &places {
                     self.line(vec![(place.0, y(0.0)), *place], role.stroke(9))?;
@@ -282,7 +283,7 @@ impl<B: DrawingBackend> Pen<'_, B> {
                 }
             }
             for place in marked(&places, index) {
-                self.marker(index, place, role)?;
+                self.marker(shape, place, role)?;
             }
             if let Some(&end) = places.last() {
                 ends.push((index, end));
@@ -387,14 +388,15 @@ impl<B: DrawingBackend> Pen<'_, B> {
         }
         let left = layout.right + 30;
         for ((index, end), place) in ends.into_iter().zip(places) {
-            let role = Role::Series(index);
+            let Look { colour, shape } = chart.series[index].look;
+            let role = Role::Series(colour);
             if chart.series[index].joined && end.0 >= layout.right - 400 {
                 self.line(vec![(end.0 + 40, end.1), (left - 10, place)], Role::Grid.stroke(4))?;
             }
             if chart.series[index].joined {
-                self.dashed(&[(left, place), (left + 150, place)], dashes(index), role.stroke(9))?;
+                self.dashed(&[(left, place), (left + 150, place)], dashes(shape), role.stroke(9))?;
             }
-            self.marker(index, (left + 75, place), role)?;
+            self.marker(shape, (left + 75, place), role)?;
             self.text(
                 &short(&chart.series[index].name),
                 (left + 178, place),
@@ -482,7 +484,7 @@ impl<B: DrawingBackend> Pen<'_, B> {
     }
 }
 
-/// The dashes of a series; past eight series colour and marker come again with other dashes.
+/// The dashes of a shape; past eight shapes the markers come again with other dashes.
 fn dashes(index: usize) -> &'static [f64] {
     DASHES[(index + index / DASHES.len() * 3) % DASHES.len()]
 }

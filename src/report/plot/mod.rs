@@ -35,6 +35,14 @@ pub struct Series {
     pub joined: bool,
     /// x at which a new phase of the computation begins.
     pub phases: Vec<f64>,
+    pub look: Look,
+}
+
+/// How a series is told from others: a colour, and a shape of dashes and markers.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Look {
+    pub colour: usize,
+    pub shape: usize,
 }
 
 /// A value with the lowest and highest of the jobs that it stands for.
@@ -56,7 +64,13 @@ pub fn chart(experiment: &Experiment, plot: &Plot, rows: &[Row]) -> Chart {
     let is_axis = chosen
         .iter()
         .any(|row| row.axes.iter().any(|(axis, _)| *axis == plot.x));
-    let is_trace = !is_axis && chosen.iter().any(|row| row.record.result.traces.contains_key(&plot.x));
+    // A figure may have one too: against another figure it is meant itself.
+    let has_traces = |row: &&Row| {
+        [&plot.x, &plot.y]
+            .iter()
+            .all(|name| row.record.result.traces.contains_key(*name))
+    };
+    let is_trace = !is_axis && chosen.iter().any(has_traces);
     let mut notes = Vec::new();
     let mut categories: Vec<String> = Vec::new();
     let mut series = if is_trace {
@@ -90,6 +104,7 @@ pub fn chart(experiment: &Experiment, plot: &Plot, rows: &[Row]) -> Chart {
         ));
     }
     series.retain(|one| !one.points.is_empty());
+    look(&mut series, plot.series.len());
     if series.is_empty() {
         notes.push("There is nothing to show.".into());
     }
@@ -150,6 +165,44 @@ impl Chart {
     }
 }
 
+/// Gives each series its look. Few have a colour and a shape of their own; of more than there are colours, those of one value
+/// of the first axis share the colour and those of equal values of the others the shape, where there are enough of both.
+fn look(series: &mut [Series], axes: usize) {
+    for (index, one) in series.iter_mut().enumerate() {
+        one.look = Look {
+            colour: index,
+            shape: index,
+        };
+    }
+    let most = draw::SERIES.len();
+    if series.len() <= most || axes < 2 {
+        return;
+    }
+    let mut looks = Vec::new();
+    let mut colours: Vec<&str> = Vec::new();
+    let mut shapes: Vec<&str> = Vec::new();
+    let place = |known: &[&str], part: &str| known.iter().position(|other| *other == part).unwrap_or(known.len());
+    for one in series.iter() {
+        let Some((first, rest)) = one.name.split_once(", ") else {
+            return;
+        };
+        let colour = place(&colours, first);
+        if colour == colours.len() {
+            colours.push(first);
+        }
+        let shape = place(&shapes, rest);
+        if shape == shapes.len() {
+            shapes.push(rest);
+        }
+        looks.push(Look { colour, shape });
+    }
+    if colours.len() <= most && shapes.len() <= most {
+        for (one, look) in series.iter_mut().zip(looks) {
+            one.look = look;
+        }
+    }
+}
+
 fn traces(plot: &Plot, chosen: &[&Row], notes: &mut Vec<String>) -> Vec<Series> {
     let mut series = Vec::new();
     let mut without = Vec::new();
@@ -184,6 +237,7 @@ fn traces(plot: &Plot, chosen: &[&Row], notes: &mut Vec<String>) -> Vec<Series> 
                 .collect(),
             joined: true,
             phases,
+            look: Look::default(),
         });
     }
     if !without.is_empty() {
@@ -227,6 +281,7 @@ fn figures(plot: &Plot, chosen: &[&Row], categories: &mut Vec<String>, notes: &m
                     points: Vec::new(),
                     joined: numeric,
                     phases: Vec::new(),
+                    look: Look::default(),
                 },
                 Vec::new(),
             ));

@@ -431,7 +431,8 @@ fn best_figures<'a>(
         let mut groups: BTreeMap<String, Vec<(usize, f64)>> = BTreeMap::new();
         for (index, line) in parts.iter().map(|parts| &parts[column]).enumerate() {
             let values = figures(line, name_of(column));
-            if values.is_empty() || line.jobs.iter().any(|job| !job.done()) {
+            // Who stops early does not win.
+            if values.is_empty() || line.jobs.iter().any(|job| job.remarkable()) {
                 continue;
             }
             let fixed = line.axes.len().saturating_sub(1);
@@ -559,11 +560,32 @@ fn legend(table: &Table, quantities: &[Quantity], parts: &[Vec<Line>], any_best:
     }
     if any_best {
         legend.push(match table.rows.as_slice() {
-            [] | [_] => "Bold: the best of a column.".to_string(),
+            [] | [_] => "Bold: the best of a column among jobs that converged.".to_string(),
             [fixed @ .., last] => {
-                format!("Bold: the best {last} of a column at equal {}.", fixed.join(" and "))
+                format!(
+                    "Bold: the best {last} of a column at equal {} among jobs that converged.",
+                    fixed.join(" and ")
+                )
             }
         });
+    }
+    if quantities.iter().any(|quantity| quantity.name == "seconds") {
+        let jobs = || parts.iter().flatten().flat_map(|line| &line.jobs);
+        let alone = |job: &&&Row| job.record.measurement.exclusive;
+        if jobs().any(|job| alone(&job)) && !jobs().all(|job| alone(&job)) {
+            legend.push(
+                "Some of these jobs ran alone and some beside others (jobs.csv tells which): their seconds are no match; \
+                 cpu_seconds are."
+                    .into(),
+            );
+        }
+        let busy = jobs().filter(|job| job.waited()).count();
+        if busy > 0 {
+            legend.push(format!(
+                "The machine was busy with something else while {busy} of these jobs ran alone: their seconds exceed their \
+                 processor time by more than a quarter."
+            ));
+        }
     }
     if parts.iter().flatten().any(|line| line.jobs.len() > 1) {
         legend.push("A \u{b1} B (n): mean and sample standard deviation of n jobs.".into());

@@ -11,10 +11,10 @@ use super::exact::{self, ExactClipper};
 use super::frame::Frame;
 use super::reach::Reach;
 use super::subdivide::Subdivision;
-use super::{Compatibility, Way, Ways};
+use super::{Compatibility, Visitor, Way, Ways};
 use crate::geometry::point_tree::{PointTree, SomePoints};
 use crate::linalg::lanes::Vector;
-use crate::mesh::{dot, subtract};
+use crate::linalg::vector3::{add, dot, subtract};
 
 /// Triangles with more candidates are subdivided first.
 const MANY: usize = 48;
@@ -57,7 +57,7 @@ impl Cutter {
         sites: &PointTree,
         compatibility: Option<Compatibility<'_>>,
         first: Way,
-        visit: &mut impl FnMut(&Cut<'_>),
+        visitor: &mut impl Visitor,
     ) {
         let Some(frame) = Frame::new(reach.corners) else { return };
         let tolerance = self.find_candidates::<V>(reach, &frame, at_hand, sites, compatibility);
@@ -69,7 +69,7 @@ impl Cutter {
             self.divide::<V>(&frame, tolerance, first);
         }
         for &(owner, start, end) in &self.polygons.parts {
-            visit(&Cut {
+            visitor.piece(&Cut {
                 triangle: reach.triangle,
                 frame: &frame,
                 candidates: &self.candidates,
@@ -113,47 +113,34 @@ impl Cutter {
                 if !found.contains(&reference) {
                     found.push(reference);
                 }
-                // Sites in one place may differ by their normals.
-                for place in 0..found.len() {
-                    let mut site = found[place];
-                    while let Some(twin) = sites.twin(site) {
-                        found.push(twin);
-                        site = twin;
+                // Sites in one place differ by their offsets alone, so that the smallest one wins everywhere.
+                for site in found.iter_mut() {
+                    let mut twin = *site;
+                    while let Some(next) = sites.twin(twin) {
+                        twin = next;
+                        if offset(twin) < offset(*site) {
+                            *site = twin;
+                        }
                     }
                 }
             }
         }
         let origin = positions[reference as usize];
         let reference_offset = offset(reference);
-        let mut scale = 0.0f64;
-        candidates.clear();
-        let to_origin = subtract(origin, frame.origin);
-        let mut add = |site: u32| {
-            let y = positions[site as usize];
-            let difference = subtract(y, origin);
-            let from_origin = subtract(y, frame.origin);
-            let middle = [
-                from_origin[0] + to_origin[0],
-                from_origin[1] + to_origin[1],
-                from_origin[2] + to_origin[2],
-            ];
-            let offset = offset(site);
-            scale = scale.max(size(difference) * (size(middle) + 2.0 * frame.diameter) + offset + reference_offset);
-            candidates.push(Candidate {
-                site,
-                height: [
-                    -2.0 * dot(difference, frame.tangents[0]),
-                    -2.0 * dot(difference, frame.tangents[1]),
-                    dot(difference, middle) + (offset - reference_offset),
-                ],
-                local: frame.local(from_origin),
-                offset,
-            });
+        let reference = Reference {
+            site: reference,
+            origin,
+            to_origin: subtract(origin, frame.origin),
+            offset: reference_offset,
         };
-        add(reference);
+        let (own, mut scale) = reference.candidate(frame, reference.site, origin, reference_offset);
+        candidates.clear();
+        candidates.push(own);
         for &site in found.iter() {
-            if site != reference {
-                add(site);
+            if site != reference.site {
+                let (candidate, size) = reference.candidate(frame, site, positions[site as usize], offset(site));
+                candidates.push(candidate);
+                scale = scale.max(size);
             }
         }
         32.0 * f64::EPSILON * scale
@@ -270,6 +257,39 @@ impl Cutter {
                 polygons.push(owner, polygon);
             }
         }
+    }
+}
+
+/// The candidate that the others' height functions are relative to.
+struct Reference {
+    site: u32,
+    /// Its position, in space and from the frame's origin.
+    origin: [f64; 3],
+    to_origin: [f64; 3],
+    offset: f64,
+}
+
+impl Reference {
+    /// A site as a candidate, and the size of the terms in its height function.
+    #[inline(always)]
+    fn candidate(&self, frame: &Frame, site: u32, position: [f64; 3], offset: f64) -> (Candidate, f64) {
+        let difference = subtract(position, self.origin);
+        let from_origin = subtract(position, frame.origin);
+        let middle = add(from_origin, self.to_origin);
+        let candidate = Candidate {
+            site,
+            height: [
+                -2.0 * dot(difference, frame.tangents[0]),
+                -2.0 * dot(difference, frame.tangents[1]),
+                dot(difference, middle) + (offset - self.offset),
+            ],
+            local: frame.local(from_origin),
+            offset,
+        };
+        (
+            candidate,
+            size(difference) * (size(middle) + 2.0 * frame.diameter) + offset + self.offset,
+        )
     }
 }
 

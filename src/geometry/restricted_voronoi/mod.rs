@@ -33,12 +33,13 @@ use cut::Cutter;
 use nearest::FindNearest;
 use rayon::prelude::*;
 use reach::{Around, Reach};
-use std::cell::RefCell;
 use std::fmt;
 use std::sync::Mutex;
 
 /// Triangles, or vertices, treated together by one thread.
 const CHUNK: usize = 512;
+/// Most chunks that a thread takes at once: chunks differ in work, and with more the last thread would keep all waiting.
+const AT_ONCE: usize = 2;
 /// Most triangles, or vertices, whose sites are looked up together,
 const BLOCK: usize = 16;
 /// and most sites that are kept at hand for them.
@@ -224,13 +225,12 @@ impl RestrictedVoronoi {
         points: &[[f64; 3]],
         sites: &PointTree,
         compatibility: Option<Compatibility<'_>>,
-        mut visit: impl FnMut(&Piece<'_>),
+        visit: impl FnMut(&Piece<'_>),
     ) -> Ways {
         if !self.find_nearest(points, sites) {
             return Ways::default();
         }
         let mut scratch = Scratch::default();
-        let (mut polygon, mut labels) = (Vec::new(), Vec::new());
         let triangles: Vec<u32> = (0..self.cells.len() as u32).collect();
         Processor::detect().run(Sweep {
             diagram: self,
@@ -239,64 +239,44 @@ impl RestrictedVoronoi {
             sites,
             compatibility,
             scratch: &mut scratch,
-            visit: |cut: &Cut<'_>| {
-                polygon.clear();
-                labels.clear();
-                let mut doubled = 0.0;
-                for (k, corner) in cut.polygon.iter().enumerate() {
-                    let next = cut.polygon[(k + 1) % cut.polygon.len()];
-                    doubled += corner.u * next.v - corner.v * next.u;
-                    let x = cut.frame.space([corner.u, corner.v, 0.0]);
-                    polygon.push(std::array::from_fn(|axis| cut.frame.origin[axis] + x[axis]));
-                    labels.push(match corner.mark {
-                        mark if mark < 0 => Label::Edge((-1 - mark) as u8),
-                        other => Label::Site(cut.candidates[other as usize].site),
-                    });
-                }
-                visit(&Piece {
-                    triangle: cut.triangle,
-                    site: cut.candidates[cut.owner].site,
-                    polygon: &polygon,
-                    labels: &labels,
-                    area: 0.5 * doubled,
-                });
+            visitor: Shower {
+                visit,
+                polygon: Vec::new(),
+                labels: Vec::new(),
             },
-            whole: |_: &[[f64; 3]; 3], _| false,
         });
         scratch.cutter.ways
     }
 
-    /// Calls `visit` for every piece, in parallel: chunk `k` of the triangles with `states[k]`. A triangle that lies in the
-    /// cell of one site is first shown to `whole`, as its corners and the site, and not to `visit` if that returns true.
-    pub(crate) fn sweep<State: Send>(
+    /// Shows every piece, in parallel: those of chunk `k` of the triangles to what `visitor` makes of `states[k]`.
+    pub(crate) fn sweep<'s, State: Send, V: Visitor>(
         &mut self,
         points: &[[f64; 3]],
         sites: &PointTree,
         compatibility: Option<Compatibility<'_>>,
-        states: &mut [State],
-        visit: impl Fn(&mut State, &Cut<'_>) + Sync,
-        whole: impl Fn(&mut State, &[[f64; 3]; 3], u32) -> bool + Sync,
+        states: &'s mut [State],
+        visitor: impl Fn(&'s mut State) -> V + Sync,
     ) -> bool {
         if !self.find_nearest(points, sites) {
             return false;
         }
         let this = &*self;
         let processor = Processor::detect();
-        this.order.par_chunks(CHUNK).zip(states).for_each(|(triangles, state)| {
-            let state = RefCell::new(state);
-            let mut scratch = this.take();
-            processor.run(Sweep {
-                diagram: this,
-                triangles,
-                points,
-                sites,
-                compatibility,
-                scratch: &mut scratch,
-                visit: |cut: &Cut<'_>| visit(&mut **state.borrow_mut(), cut),
-                whole: |corners: &[[f64; 3]; 3], site| whole(&mut **state.borrow_mut(), corners, site),
+        (this.order.par_chunks(CHUNK).zip(states))
+            .with_max_len(AT_ONCE)
+            .for_each(|(triangles, state)| {
+                let mut scratch = this.take();
+                processor.run(Sweep {
+                    diagram: this,
+                    triangles,
+                    points,
+                    sites,
+                    compatibility,
+                    scratch: &mut scratch,
+                    visitor: visitor(state),
+                });
+                this.give(scratch);
             });
-            this.give(scratch);
-        });
         true
     }
 
@@ -331,6 +311,7 @@ impl RestrictedVoronoi {
         this.vertex_order
             .par_chunks(CHUNK)
             .zip(ordered.par_chunks_mut(CHUNK))
+            .with_max_len(AT_ONCE)
             .for_each(|(vertices, found)| {
                 let mut scratch = this.take();
                 processor.run(FindNearest {
@@ -363,20 +344,67 @@ impl RestrictedVoronoi {
     }
 }
 
+/// What is done with the pieces. No closures: they would not inherit the instruction set, and its functions must be
+/// `#[inline(always)]` to do so.
+pub(crate) trait Visitor {
+    /// A triangle that lies in the cell of one site: true if that is all the visitor wants to know of it. Not asked with
+    /// normals in the distance.
+    fn whole(&mut self, corners: &[[f64; 3]; 3], site: u32) -> bool;
+
+    fn piece(&mut self, cut: &Cut<'_>);
+}
+
+/// Shows pieces in space.
+struct Shower<Visit> {
+    visit: Visit,
+    polygon: Vec<[f64; 3]>,
+    labels: Vec<Label>,
+}
+
+impl<Visit: FnMut(&Piece<'_>)> Visitor for Shower<Visit> {
+    #[inline(always)]
+    fn whole(&mut self, _: &[[f64; 3]; 3], _: u32) -> bool {
+        false
+    }
+
+    #[inline(always)]
+    fn piece(&mut self, cut: &Cut<'_>) {
+        self.polygon.clear();
+        self.labels.clear();
+        let mut doubled = 0.0;
+        for (k, corner) in cut.polygon.iter().enumerate() {
+            let next = cut.polygon[(k + 1) % cut.polygon.len()];
+            doubled += corner.u * next.v - corner.v * next.u;
+            let x = cut.frame.space([corner.u, corner.v, 0.0]);
+            self.polygon
+                .push(std::array::from_fn(|axis| cut.frame.origin[axis] + x[axis]));
+            self.labels.push(match corner.mark {
+                mark if mark < 0 => Label::Edge((-1 - mark) as u8),
+                other => Label::Site(cut.candidates[other as usize].site),
+            });
+        }
+        (self.visit)(&Piece {
+            triangle: cut.triangle,
+            site: cut.candidates[cut.owner].site,
+            polygon: &self.polygon,
+            labels: &self.labels,
+            area: 0.5 * doubled,
+        });
+    }
+}
+
 /// Cuts a chunk of triangles in vector registers.
-struct Sweep<'a, Visit, Whole> {
+struct Sweep<'a, Pieces> {
     diagram: &'a RestrictedVoronoi,
     triangles: &'a [u32],
     points: &'a [[f64; 3]],
     sites: &'a PointTree,
     compatibility: Option<Compatibility<'a>>,
     scratch: &'a mut Scratch,
-    visit: Visit,
-    /// Takes a triangle that lies in the cell of one site, if it likes.
-    whole: Whole,
+    visitor: Pieces,
 }
 
-impl<Visit: FnMut(&Cut<'_>), Whole: FnMut(&[[f64; 3]; 3], u32) -> bool> Kernel for Sweep<'_, Visit, Whole> {
+impl<Pieces: Visitor> Kernel for Sweep<'_, Pieces> {
     #[inline(always)]
     fn run<V: Vector>(mut self) {
         let diagram = self.diagram;
@@ -398,7 +426,10 @@ impl<Visit: FnMut(&Cut<'_>), Whole: FnMut(&[[f64; 3]; 3], u32) -> bool> Kernel f
             let at_hand =
                 count > 1 && (self.sites).gather::<V>(around.low, around.high, bound, AT_HAND, &mut self.scratch.some);
             for reach in &reaches {
-                if self.compatibility.is_none() && reach.is_whole() && (self.whole)(&reach.corners, reach.reference) {
+                if self.compatibility.is_none()
+                    && reach.is_whole()
+                    && self.visitor.whole(&reach.corners, reach.reference)
+                {
                     continue;
                 }
                 self.scratch.cutter.cut::<V>(
@@ -407,7 +438,7 @@ impl<Visit: FnMut(&Cut<'_>), Whole: FnMut(&[[f64; 3]; 3], u32) -> bool> Kernel f
                     self.sites,
                     self.compatibility,
                     diagram.first,
-                    &mut self.visit,
+                    &mut self.visitor,
                 );
             }
         }

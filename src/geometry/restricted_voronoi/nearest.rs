@@ -5,7 +5,7 @@ use super::reach::Around;
 use crate::geometry::point_tree::{PointTree, SomePoints};
 use crate::linalg::lanes::Vector;
 use crate::linalg::processor::Kernel;
-use crate::mesh::{dot, subtract};
+use crate::linalg::vector3::{dot, subtract};
 
 /// Finds the sites nearest to a chunk of vertices.
 pub(super) struct FindNearest<'a> {

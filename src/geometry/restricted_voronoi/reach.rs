@@ -1,6 +1,6 @@
 //! How near a site must come to a triangle to own a part of it.
 
-use crate::mesh::{dot, subtract};
+use crate::linalg::vector3::{dot, subtract};
 
 /// The sites nearest to a triangle's vertices, and how near another one must come to own a part of it.
 #[derive(Clone, Copy, Debug)]

@@ -1,6 +1,6 @@
 //! Surface fitting by Voronoi squared distance minimization: a mesh, or the control mesh of a Catmull-Clark surface, onto
-//! a target of triangles that need not hang together, or of points alone. Source: Nivoliers, Yan, Lévy 2012, Fitting polynomial surfaces to
-//! triangular meshes with Voronoi squared distance minimization.
+//! a target of triangles that need not hang together, or of points alone. Source: Nivoliers, Yan, Lévy 2012, Fitting
+//! polynomial surfaces to triangular meshes with Voronoi squared distance minimization.
 //!
 //! The stages: [`problem`] reads the model and scales it, [`sampling`] samples the target, [`objective`] is minimized by
 //! L-BFGS through a schedule of anisotropy and regularization, [`outcome`] measures the fit.
@@ -45,7 +45,7 @@ impl Method for SurfaceFit {
     }
 
     fn version(&self) -> u32 {
-        2
+        3
     }
 
     fn summary(&self) -> &'static str {

@@ -25,6 +25,8 @@ pub struct Parts {
     pub to_target: f64,
     /// `|L X|^2`, without its factor.
     pub regularizer: f64,
+    /// `|P L X|^2`, without its factor.
+    pub unevenness: f64,
 }
 
 /// What the second term runs over.
@@ -61,6 +63,9 @@ pub struct FitObjective<'a> {
     normals: Vec<[f64; 3]>,
     areas: Vec<[f64; 3]>,
     turns: Vec<[f64; 3]>,
+    /// Of the fit at the start of the stage; once it is known.
+    tangents: Option<Vec<Tangent>>,
+    boundary: Vec<bool>,
     control: Vec<[f64; 3]>,
     preconditioner: Option<Preconditioner>,
     blocks: Vec<Block>,
@@ -69,6 +74,9 @@ pub struct FitObjective<'a> {
     /// Evaluations since the preconditioner was made.
     age: usize,
 }
+
+/// The projection along the fit at one of its points, by the unit normal there: none without a normal.
+pub type Tangent = Option<[f64; 3]>;
 
 /// Evaluations after which the preconditioner is made anew.
 const AGE: usize = 5;
@@ -110,8 +118,13 @@ impl<'a> FitObjective<'a> {
                 reason: format!("{role}: {error}"),
             })
         };
-        let edges: Vec<[u32; 2]> = fitted.edges().into_iter().map(|edge| edge.ends).collect();
         let count = fitted.points.len();
+        let all_edges = fitted.edges();
+        let mut boundary = vec![false; count];
+        for edge in all_edges.iter().filter(|edge| edge.faces.len() == 1) {
+            edge.ends.iter().for_each(|&end| boundary[end as usize] = true);
+        }
+        let edges: Vec<[u32; 2]> = all_edges.into_iter().map(|edge| edge.ends).collect();
         let mut degrees = vec![0.0; count];
         for &end in edges.as_flattened() {
             degrees[end as usize] += 1.0;
@@ -157,6 +170,8 @@ impl<'a> FitObjective<'a> {
             normals: vec![[0.0; 3]; count],
             areas: vec![[0.0; 3]; count],
             turns: vec![[0.0; 3]; count],
+            tangents: None,
+            boundary,
             control: vec![[0.0; 3]; map.columns()],
         })
     }
@@ -168,6 +183,7 @@ impl<'a> FitObjective<'a> {
 
     pub fn set_stage(&mut self, stage: Stage) {
         self.stage = stage;
+        self.tangents = None;
         self.age = AGE;
     }
 
@@ -215,7 +231,13 @@ impl<'a> FitObjective<'a> {
             });
         }
         if preconditioner
-            .refresh(self.map, &self.blocks, self.stage.regularization)
+            .refresh(
+                self.map,
+                &self.blocks,
+                self.stage.regularization,
+                self.stage.evenness,
+                self.tangents.as_deref().unwrap_or_default(),
+            )
             .is_err()
         {
             self.preconditioner = None;
@@ -294,15 +316,39 @@ impl<'a> FitObjective<'a> {
                 }
             }
         }
-        // |L X|^2 and its gradient 2 L L X; L is symmetric.
+        // |L X|^2 and its gradient 2 L L X, |P L X|^2 and its gradient 2 L P L X; L is symmetric.
         apply_laplacian(&self.edges, &self.degrees, &self.points, &mut self.laplacian);
         parts.regularizer = self.laplacian.as_flattened().iter().map(|x| x * x).sum();
-        if with_gradient && self.stage.regularization > 0.0 {
+        let Stage {
+            regularization,
+            evenness,
+            ..
+        } = self.stage;
+        let tangents = match &self.tangents {
+            Some(tangents) => tangents,
+            None => {
+                self.find_normals();
+                let tangents = self.normals.iter().zip(&self.boundary);
+                let tangents = tangents.map(|(&normal, &boundary)| (!boundary && normal != [0.0; 3]).then_some(normal));
+                self.tangents.insert(tangents.collect())
+            }
+        };
+        for (bend, tangent) in self.laplacian.iter_mut().zip(tangents) {
+            let mut along = [0.0; 3];
+            if let Some(n) = tangent {
+                let out = dot(*bend, *n);
+                along = std::array::from_fn(|axis| bend[axis] - out * n[axis]);
+                parts.unevenness += dot(along, along);
+            }
+            *bend = std::array::from_fn(|axis| regularization * bend[axis] + evenness * along[axis]);
+        }
+        if with_gradient && regularization.max(evenness) > 0.0 {
             apply_laplacian(&self.edges, &self.degrees, &self.laplacian, &mut self.term);
-            add_to(&mut self.gradient, &self.term, 2.0 * self.stage.regularization);
+            add_to(&mut self.gradient, &self.term, 2.0);
         }
         self.latest.set(parts);
-        let value = parts.to_target + parts.from_target + self.stage.regularization * parts.regularizer;
+        let value =
+            parts.to_target + parts.from_target + regularization * parts.regularizer + evenness * parts.unevenness;
         if value.is_finite() { value } else { f64::INFINITY }
     }
 

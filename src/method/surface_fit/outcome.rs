@@ -88,15 +88,23 @@ pub fn measure(
         jacobians.iter().copied().fold(f64::INFINITY, f64::min),
     );
     set(
+        "folded_faces",
+        jacobians.iter().filter(|&&jacobian| !(jacobian > 0.0)).count() as f64,
+    );
+    set(
         "scaled_jacobian_mean",
         jacobians.iter().sum::<f64>() / jacobians.len() as f64,
     );
     set("target_to_fit", parts.from_target);
     set("fit_to_target", parts.to_target);
     set("regularizer", parts.regularizer);
+    set("unevenness", parts.unevenness);
     set(
         "energy",
-        parts.from_target + parts.to_target + stage.regularization * parts.regularizer,
+        parts.from_target
+            + parts.to_target
+            + stage.regularization * parts.regularizer
+            + stage.evenness * parts.unevenness,
     );
     let area = triangulated.area();
     set(

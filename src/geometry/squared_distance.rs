@@ -163,7 +163,7 @@ impl SquaredDistance {
     }
 
     /// The value of the term, and what is `wanted`. The value is infinite, and nothing wanted is written, when a
-    /// coordinate is not finite or there are no sites.
+    /// coordinate is not finite or there are no sites; a surface without triangles has the value 0 even then.
     ///
     /// # Panics
     /// When an array has another length than its documentation says.

@@ -170,6 +170,7 @@ impl Cutter {
         }
         self.decide::<V>(frame, tolerance);
         self.ways.exact += 1;
+        self.ways.gaps += usize::from(!fills(&self.polygons));
     }
 
     #[inline(always)]

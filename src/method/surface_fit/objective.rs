@@ -68,6 +68,8 @@ pub struct FitObjective<'a> {
     boundary: Vec<bool>,
     control: Vec<[f64; 3]>,
     preconditioner: Option<Preconditioner>,
+    /// Why there is no preconditioner though one was asked for.
+    without: Option<String>,
     blocks: Vec<Block>,
     /// Unit normals of the target's triangles, zero where there is none.
     target_normals: Vec<[f64; 3]>,
@@ -129,10 +131,13 @@ impl<'a> FitObjective<'a> {
         for &end in edges.as_flattened() {
             degrees[end as usize] += 1.0;
         }
-        let preconditioner = match settings.preconditioner {
-            Preconditioning::None => None,
-            // Without one the minimization is slower and no less sound.
-            Preconditioning::Hessian => Preconditioner::new(map, &edges, &degrees, control).ok(),
+        // Without one the minimization is slower and no less sound.
+        let (preconditioner, without) = match settings.preconditioner {
+            Preconditioning::None => (None, None),
+            Preconditioning::Hessian => match Preconditioner::new(map, &edges, &degrees, control) {
+                Ok(preconditioner) => (Some(preconditioner), None),
+                Err(reason) => (None, Some(reason)),
+            },
         };
         let target_normals = target.cells.iter().map(|&cell| {
             let area = area_vector(target.corners(cell));
@@ -141,6 +146,7 @@ impl<'a> FitObjective<'a> {
         });
         Ok(FitObjective {
             preconditioner,
+            without,
             blocks: vec![[0.0; 6]; count],
             target_normals: target_normals.collect(),
             age: AGE,
@@ -179,6 +185,11 @@ impl<'a> FitObjective<'a> {
     /// The parts of the latest evaluation.
     pub fn latest(&self) -> Rc<Cell<Parts>> {
         self.latest.clone()
+    }
+
+    /// Why the minimization goes without the preconditioner that was asked for, if it does.
+    pub fn without_preconditioner(&self) -> Option<&str> {
+        self.without.as_deref()
     }
 
     pub fn set_stage(&mut self, stage: Stage) {
@@ -230,17 +241,16 @@ impl<'a> FitObjective<'a> {
                 pull(piece.site, piece.area, normals[piece.triangle as usize]);
             });
         }
-        if preconditioner
-            .refresh(
-                self.map,
-                &self.blocks,
-                self.stage.regularization,
-                self.stage.evenness,
-                self.tangents.as_deref().unwrap_or_default(),
-            )
-            .is_err()
-        {
+        let made = preconditioner.refresh(
+            self.map,
+            &self.blocks,
+            self.stage.regularization,
+            self.stage.evenness,
+            self.tangents.as_deref().unwrap_or_default(),
+        );
+        if let Err(reason) = made {
             self.preconditioner = None;
+            self.without = Some(reason);
         }
     }
 

@@ -9,6 +9,9 @@ use super::objective::Tangent;
 use crate::linalg::sparse::{BlockCholesky, BlockPattern};
 use crate::mesh::linear_map::LinearMap;
 
+/// Most couplings that are added up.
+const MOST: usize = 100_000_000;
+
 /// A symmetric 3x3 block: xx, xy, xz, yy, yz, zz.
 pub type Block = [f64; 6];
 
@@ -51,6 +54,15 @@ impl Preconditioner {
             rows[b as usize].extend(map.row(a as usize).iter().map(|&(c, w)| (c, -w)));
         }
         let bent = LinearMap::from_rows(count, rows.into_iter());
+        // A vertex with many neighbours couples them all.
+        let pairs: usize = (0..map.rows())
+            .map(|row| bent.row(row).len().pow(2) / 2 + map.row(row).len().pow(2) / 2)
+            .sum();
+        if pairs > MOST {
+            return Err(format!(
+                "{pairs} couplings of control points are more than the {MOST} it may have"
+            ));
+        }
         let mut neighbours: Vec<Vec<u32>> = vec![Vec::new(); count];
         let mut couple = |row: &[(u32, f64)]| {
             for (index, &(a, _)) in row.iter().enumerate() {

@@ -184,7 +184,8 @@ fn clouds_are_fitted() {
         ("7\n", "announces 7 points and 0 follow"),
         ("3\n1 2 3\n1 2 4\n", "announces 3 points and 2 follow"),
         ("5 foo bar\n1 2 3\n", "cloud.xyz:1"),
-        ("1 2 3\n1 2 3\n", "no cloud"),
+        ("1 2 3\n1 2 3\n", "the diagonal 0"),
+        ("1 2 3\n1 2 4\n", "no cloud"),
         ("", "no points"),
     ] {
         let error = fit(cloud(text.to_string()), template(), json!({})).unwrap_err();

@@ -63,8 +63,8 @@ impl Subdivision {
         self.seen.resize(heights.len(), u32::MAX);
     }
 
-    /// Divides the part with these corners, on which the functions in `self.stack[range]` remain. `vain` counts the divisions
-    /// before that left most of them in two children at least: one for two children, two for four.
+    /// Divides the part with these corners, on which the functions in `self.stack[range]` remain. `vain` counts the
+    /// divisions before that left most of them in two children at least: one for two children, two for four.
     fn part(
         &mut self,
         corners: [[f64; 2]; 3],

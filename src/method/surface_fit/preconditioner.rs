@@ -2,8 +2,9 @@
 //!
 //! With the cells held still both terms are quadratic in the fitted points: a piece of area `a` pulls a point with
 //! `a (I + (s^2 - 1) n n^T)`. These blocks `B`, one a fitted point, and the regularizers give
-//! `2 M^T (B + lambda L^2 + mu L P L) M` over the control points, with the projections `P` along the fit. Normal and tangential stiffness differ by `s^2`, 2500 by default, which no step of plain L-BFGS
-//! copes with. The blocks follow the fit: they are made anew every few evaluations.
+//! `2 M^T (B + lambda L^2 + mu L P L) M` over the control points, with the projections `P` along the fit. Normal and
+//! tangential stiffness differ by `s^2`, 2500 by default, which no step of plain L-BFGS copes with. The blocks follow the fit:
+//! they are made anew every few evaluations.
 
 use super::objective::Tangent;
 use crate::linalg::sparse::{BlockCholesky, BlockPattern};

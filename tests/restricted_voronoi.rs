@@ -407,7 +407,7 @@ fn every_way_of_cutting() {
     let (points, cells) = soup(random.points(60));
     for count in [5, 30, 400] {
         let tree = PointTree::new(&random.points(count));
-        let mut by_way = |way: Way| {
+        let by_way = |way: Way| {
             let mut diagram = RestrictedVoronoi::new(&points, &cells).expect("a valid surface");
             diagram.begin_with(way);
             let mut areas = std::collections::BTreeMap::new();

@@ -1,7 +1,7 @@
 //! The restricted Voronoi diagram against brute force, on random and on adversarial inputs.
 
 use vargeo::geometry::point_tree::PointTree;
-use vargeo::geometry::restricted_voronoi::{Compatibility, Error, Label, RestrictedVoronoi, Way, Ways};
+use vargeo::geometry::restricted_voronoi::{Compatibility, Error, Label, RestrictedVoronoi, Way};
 
 type Point = [f64; 3];
 
@@ -399,8 +399,7 @@ fn normal_compatibility_on_random_soups() {
     }
 }
 
-/// The slower ways give the same pieces as the quick one, and inputs that spoil the quick ones go the slower ways by
-/// themselves.
+/// The slower ways, when forced, give the same pieces as the quick one.
 #[test]
 fn every_way_of_cutting() {
     let mut random = Random(8);
@@ -438,21 +437,6 @@ fn every_way_of_cutting() {
             }
         }
     }
-    // All sites as near to one point, and a triangle in a bisector: rounding breaks the walk.
-    let mut sum = Ways::default();
-    for k in 0..40 {
-        let height = 0.5 + 1e-17 * f64::from(k);
-        let (points, cells) = soup(vec![[0.1, 0.2, height], [2.7, 0.1, height], [2.9, 2.8, height]]);
-        let mut diagram = RestrictedVoronoi::new(&points, &cells).expect("a valid surface");
-        let sites: Vec<Point> = grid(3, 1.0)
-            .iter()
-            .map(|x| x.map(|x| x + 1e-16 * random.next()))
-            .collect();
-        let ways = diagram.pieces(&points, &PointTree::new(&sites), None, |_| {});
-        sum.exact += ways.exact;
-        sum.gaps += ways.gaps;
-    }
-    assert!(sum.exact > 0 && sum.gaps == 0, "{sum:?}");
 }
 
 /// More sites than are cut at once, as near to each other along a line or all over a triangle: time and memory stay bounded.

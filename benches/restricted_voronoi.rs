@@ -113,6 +113,11 @@ fn main() {
                 .expect("threads");
             let runs = 10;
             pool.install(|| {
+                // Until the threads have found their processors.
+                let start = Instant::now();
+                while start.elapsed().as_secs_f64() < 0.5 {
+                    term.evaluate(&points, &tree, &Options::default(), Wanted::default());
+                }
                 let mut gradient = vec![[0.0; 3]; count];
                 let build = best(runs, threads == 1, || tree.set(&sites));
                 let plain = Options::default();

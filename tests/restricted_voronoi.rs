@@ -1,7 +1,7 @@
 //! The restricted Voronoi diagram against brute force, on random and on adversarial inputs.
 
 use vargeo::geometry::point_tree::PointTree;
-use vargeo::geometry::restricted_voronoi::{Compatibility, Error, Label, RestrictedVoronoi};
+use vargeo::geometry::restricted_voronoi::{Compatibility, Error, Label, RestrictedVoronoi, Way};
 
 type Point = [f64; 3];
 
@@ -50,14 +50,15 @@ fn soup(corners: Vec<Point>) -> (Vec<Point>, Vec<[u32; 3]>) {
     (corners, cells)
 }
 
-/// A piece by definition: the triangle cut by the bisector with every other site in turn.
-fn brute_force(triangle: [Point; 3], sites: &[Point], i: usize) -> Vec<Point> {
+/// A piece by definition: the triangle cut by the bisector with every other site in turn. `offsets` are added to the squared
+/// distances.
+fn brute_force(triangle: [Point; 3], sites: &[Point], offsets: &[f64], i: usize) -> Vec<Point> {
     let mut polygon = triangle.to_vec();
     for (j, &other) in sites.iter().enumerate() {
         if j == i {
             continue;
         }
-        let side = |x: Point| square(subtract(x, sites[i])) - square(subtract(x, other));
+        let side = |x: Point| square(subtract(x, sites[i])) + offsets[i] - square(subtract(x, other)) - offsets[j];
         let old = std::mem::take(&mut polygon);
         for k in 0..old.len() {
             let (a, b) = (old[k], old[(k + 1) % old.len()]);
@@ -175,7 +176,7 @@ fn brute_force_on_random_soups() {
         for (triangle, cell) in cells.iter().enumerate() {
             let corners = cell.map(|v| points[v as usize]);
             for i in 0..sites.len() {
-                let expected = area(&brute_force(corners, &sites, i));
+                let expected = area(&brute_force(corners, &sites, &vec![0.0; sites.len()], i));
                 let area = found.get(&(triangle, i)).copied().unwrap_or(0.0);
                 assert!(
                     (area - expected).abs() < 1e-12 * size * size,
@@ -358,6 +359,121 @@ fn normal_compatibility() {
     };
     assert_eq!(owners(0.1), [(0, 1), (0, 2), (1, 0), (1, 3)]);
     assert_eq!(owners(0.0), [(0, 0), (0, 2), (1, 0), (1, 2)]);
+}
+
+/// Power diagrams against brute force: every triangle has offsets of its own.
+#[test]
+fn normal_compatibility_on_random_soups() {
+    let mut random = Random(5);
+    let (points, cells) = soup(random.points(90));
+    let sites = random.points(70);
+    let normals: Vec<Point> = random
+        .points(70)
+        .iter()
+        .map(|n| n.map(|x| x / square(*n).sqrt()))
+        .collect();
+    for weight in [0.01, 0.1, 1.0] {
+        let compatibility = Some(Compatibility {
+            weight,
+            normals: &normals,
+        });
+        let mut found = std::collections::BTreeMap::new();
+        let mut diagram = RestrictedVoronoi::new(&points, &cells).expect("a valid surface");
+        diagram.pieces(&points, &PointTree::new(&sites), compatibility, |piece| {
+            found.insert((piece.triangle as usize, piece.site as usize), piece.area);
+        });
+        for (triangle, cell) in cells.iter().enumerate() {
+            let [a, b, c] = cell.map(|v| points[v as usize]);
+            let across = cross(subtract(b, a), subtract(c, a));
+            let facing = |n: &Point| n.iter().zip(across).map(|(n, x)| n * x).sum::<f64>() / square(across).sqrt();
+            let offsets: Vec<f64> = normals.iter().map(|n| weight * (1.0 - facing(n))).collect();
+            for i in 0..sites.len() {
+                let expected = area(&brute_force([a, b, c], &sites, &offsets, i));
+                let area = found.get(&(triangle, i)).copied().unwrap_or(0.0);
+                assert!(
+                    (area - expected).abs() < 1e-12,
+                    "weight {weight}, triangle {triangle}, site {i}: area {area} and {expected}"
+                );
+            }
+        }
+    }
+}
+
+/// The slower ways, when forced, give the same pieces as the quick one.
+#[test]
+fn every_way_of_cutting() {
+    let mut random = Random(8);
+    let (points, cells) = soup(random.points(60));
+    for count in [5, 30, 400] {
+        let tree = PointTree::new(&random.points(count));
+        let by_way = |way: Way| {
+            let mut diagram = RestrictedVoronoi::new(&points, &cells).expect("a valid surface");
+            diagram.begin_with(way);
+            let mut areas = std::collections::BTreeMap::new();
+            let ways = diagram.pieces(&points, &tree, None, |piece| {
+                areas.insert((piece.triangle, piece.site), piece.area);
+            });
+            (areas, ways)
+        };
+        let (expected, ways) = by_way(Way::Walk);
+        // Triangles with many sites are not walked.
+        let quick = if count < 100 { ways.walked } else { ways.clipped };
+        assert!(quick > 0 && ways.exact == 0, "{count} sites: {ways:?}");
+        for way in [Way::Clip, Way::Exact] {
+            let (areas, ways) = by_way(way);
+            assert_eq!(ways.walked, 0);
+            assert!(if way == Way::Clip {
+                ways.clipped > 0
+            } else {
+                ways.clipped == 0 && ways.exact > 0
+            });
+            assert_eq!(ways.gaps, 0);
+            for key in expected.keys().chain(areas.keys()) {
+                let [one, other] = [&expected, &areas].map(|areas| areas.get(key).copied().unwrap_or(0.0));
+                assert!(
+                    (one - other).abs() < 1e-12,
+                    "{count} sites, {way:?}, {key:?}: {one} and {other}"
+                );
+            }
+        }
+    }
+}
+
+/// More sites than are cut at once, as near to each other along a line or all over a triangle: time and memory stay bounded.
+#[test]
+fn many_sites_as_near() {
+    // On circles about an edge of one triangle and about a line through another.
+    let circle: Vec<Point> = (0..100)
+        .map(|k| (f64::from(k) / 100.0 * std::f64::consts::TAU).sin_cos())
+        .map(|(s, c)| [c, s, 0.5])
+        .collect();
+    let (points, cells) = soup(vec![
+        [0.0, 0.0, 0.0],
+        [0.0, 0.0, 1.0],
+        [0.8, 0.1, 0.4],
+        [-0.5, 0.2, 0.0],
+        [0.5, -0.2, 0.0],
+        [0.0, 0.0, 1.0],
+    ]);
+    check("about a line", &points, &cells, &circle);
+    // In one place but for rounding.
+    let mut random = Random(11);
+    let mut sites: Vec<Point> = random.points(120).iter().map(|x| x.map(|x| 2e-16 * x + 0.3)).collect();
+    sites.extend(random.points(20));
+    check("in a crowd", &points, &cells, &sites);
+    // In one place and with one normal.
+    let sites = vec![[0.1, 0.1, 0.1]; 90];
+    let normals = vec![[0.0, 0.0, 1.0]; 90];
+    let compatibility = Some(Compatibility {
+        weight: 0.1,
+        normals: &normals,
+    });
+    let mut owners = Vec::new();
+    let mut diagram = RestrictedVoronoi::new(&points, &cells).expect("a valid surface");
+    diagram.pieces(&points, &PointTree::new(&sites), compatibility, |piece| {
+        owners.push(piece.site)
+    });
+    assert_eq!(owners, [0, 0]);
 }
 
 #[test]

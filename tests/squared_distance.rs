@@ -1,4 +1,5 @@
-//! Voronoi squared distance terms: stored reference values, derivatives and their order, invariance, one result for any number of threads.
+//! Voronoi squared distance terms: stored reference values, derivatives and their order, invariance, one result for any
+//! number of threads.
 
 use serde_json::Value;
 use vargeo::geometry::point_tree::PointTree;
@@ -92,6 +93,35 @@ fn reference_values() {
         };
         let value = to_template.evaluate(&sample.target.0, &vertices, &options, wanted);
         check("T_to_S", value, &gradient);
+    }
+}
+
+/// The paper's gradient by the sites is the derivative without anisotropy, and far from it with.
+#[test]
+fn printed_gradient() {
+    let sample = sample();
+    let mut term = SquaredDistance::new(&sample.target.0, &sample.target.1).expect("a valid surface");
+    let vertices = PointTree::new(&sample.template.0);
+    let mut off = |s: f64| {
+        let [complete, paper] = [Derivative::Complete, Derivative::Paper].map(|derivative| {
+            let options = Options {
+                anisotropy: Anisotropy::Facets(s),
+                derivative,
+                ..Options::default()
+            };
+            let mut gradient = vec![[0.0; 3]; sample.template.0.len()];
+            let wanted = Wanted {
+                sites: Some(&mut gradient),
+                ..Wanted::default()
+            };
+            term.evaluate(&sample.target.0, &vertices, &options, wanted);
+            gradient
+        });
+        difference(&complete, &paper) / norm(&complete)
+    };
+    assert!(off(1.0) < 1e-14, "off by {:.1e} without anisotropy", off(1.0));
+    for s in [5.0, 50.0] {
+        assert!((0.1..1.0).contains(&off(s)), "s = {s}: off by {}", off(s));
     }
 }
 

@@ -180,8 +180,12 @@ fn clouds_are_fitted() {
     assert!(outcome.metrics["hausdorff"] < 1.5, "{:?}", outcome.metrics);
     for (text, expected) in [
         ("1 2 3\n1 2 x\n", "cloud.xyz:2"),
-        ("7\n", "no points"),
-        ("1 2 3\n1 2 3\n", "no cloud"),
+        ("0\n", "no points"),
+        ("7\n", "announces 7 points and 0 follow"),
+        ("3\n1 2 3\n1 2 4\n", "announces 3 points and 2 follow"),
+        ("5 foo bar\n1 2 3\n", "cloud.xyz:1"),
+        ("1 2 3\n1 2 3\n", "the diagonal 0"),
+        ("1 2 3\n1 2 4\n", "no cloud"),
         ("", "no points"),
     ] {
         let error = fit(cloud(text.to_string()), template(), json!({})).unwrap_err();

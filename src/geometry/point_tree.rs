@@ -50,7 +50,7 @@ pub struct PointTree {
     levels: Vec<Vec<Boxes>>,
     /// The next larger index in the same place. Empty when all places differ.
     twins: Vec<u32>,
-    keys: Vec<(u64, u32)>,
+    keys: Vec<u64>,
     order: Vec<u32>,
     finite: bool,
 }
@@ -82,8 +82,10 @@ impl PointTree {
         self.points.clear();
         self.points.extend_from_slice(points);
         self.finite = within_reach(points);
-        hilbert::order(points, &mut self.keys, &mut self.order);
-        self.remove_twins();
+        self.twins.clear();
+        if hilbert::order(points, &mut self.keys, &mut self.order) {
+            self.remove_twins();
+        }
         let leaf = |group: &[u32]| {
             let mut leaf = Leaf {
                 points: [FAR; 3],
@@ -157,39 +159,20 @@ impl PointTree {
 
     /// Leaves one index a place in `order`, and links the others to it.
     fn remove_twins(&mut self) {
-        self.twins.clear();
-        let points = &self.points;
-        let place = |index: u32| points[index as usize].map(|x| if x == 0.0 { 0 } else { x.to_bits() });
-        let mut start = 0;
-        while start < self.keys.len() {
-            let key = self.keys[start].0;
-            let mut end = start + 1;
-            while end < self.keys.len() && self.keys[end].0 == key {
-                end += 1;
-            }
-            if end - start > 1 {
-                let run = &mut self.order[start..end];
-                // Sorted by place only where there are many, to keep the curve's order.
-                run.sort_unstable_by_key(|&index| (place(index), index));
-                let mut previous = run[0];
-                for index in &mut run[1..] {
-                    if place(*index) == place(previous) {
-                        if self.twins.is_empty() {
-                            self.twins.resize(points.len(), NONE);
-                        }
-                        self.twins[previous as usize] = *index;
-                        previous = *index;
-                        *index = NONE;
-                    } else {
-                        previous = *index;
-                    }
+        let (points, twins) = (&self.points, &mut self.twins);
+        let mut last: Option<u32> = None;
+        self.order.retain(|&index| {
+            let twin = last.replace(index).filter(|&previous| {
+                hilbert::place(points[previous as usize]) == hilbert::place(points[index as usize])
+            });
+            if let Some(previous) = twin {
+                if twins.is_empty() {
+                    twins.resize(points.len(), NONE);
                 }
+                twins[previous as usize] = index;
             }
-            start = end;
-        }
-        if !self.twins.is_empty() {
-            self.order.retain(|&index| index != NONE);
-        }
+            twin.is_none()
+        });
     }
 
     /// Squared distances from `x` to eight boxes; infinite for an absent box.
@@ -291,49 +274,27 @@ impl PointTree {
         some: &mut SomePoints,
     ) -> bool {
         some.clear();
-        if self.order.is_empty() {
-            return true;
-        }
-        let mut stack = [(0u32, 0u32); STACK];
-        let mut height = 1;
-        stack[0] = (self.levels.len() as u32, 0);
-        let limit = V::constant(bound);
-        while height > 0 {
-            height -= 1;
-            let (level, node) = stack[height];
-            let boxes = &self.levels[level as usize - 1][node as usize];
-            let mut near = !V::bits(limit.less(gap::<V>(&boxes.low, &boxes.high, low, high)));
-            while near != 0 {
-                let child = node * WIDTH as u32 + near.trailing_zeros();
-                near &= near - 1;
-                if level > 1 {
-                    stack[height] = (level - 1, child);
-                    height += 1;
-                    continue;
-                }
-                let leaf = &self.leaves[child as usize];
-                let mut inside = !V::bits(limit.less(gap::<V>(&leaf.points, &leaf.points, low, high)));
-                while inside != 0 {
-                    let lane = inside.trailing_zeros() as usize;
-                    inside &= inside - 1;
-                    if leaf.indices[lane] != NONE {
-                        some.push(leaf, lane);
-                    }
-                }
-                if some.count > most {
-                    return false;
-                }
-            }
-        }
-        true
+        self.search::<V>(&mut Gather {
+            low,
+            high,
+            bound,
+            most,
+            some,
+        })
     }
 
     /// Appends, in no particular order, the points that for every row `bound` of `bounds` are less than the square root of
     /// `bound[k]` away from `centres[k]` for some `k`.
     #[inline(always)]
     pub(crate) fn contenders<V: Vector>(&self, centres: &[[f64; 3]; 3], bounds: &[[f64; 3]], found: &mut Vec<u32>) {
+        self.search::<V>(&mut Contend { centres, bounds, found });
+    }
+
+    /// Goes through the leaves that a search wants, in a fixed order, until it has enough. False when it had.
+    #[inline(always)]
+    fn search<V: Vector>(&self, search: &mut impl Search) -> bool {
         if self.order.is_empty() {
-            return;
+            return true;
         }
         let mut stack = [(0u32, 0u32); STACK];
         let mut height = 1;
@@ -341,34 +302,100 @@ impl PointTree {
         while height > 0 {
             height -= 1;
             let (level, node) = stack[height];
-            let boxes = &self.levels[level as usize - 1][node as usize];
-            let distances = [
-                Self::distances::<V>(boxes, centres[0]),
-                Self::distances::<V>(boxes, centres[1]),
-                Self::distances::<V>(boxes, centres[2]),
-            ];
-            let mut near = contend(&distances, bounds);
+            let mut near = search.wants::<V>(&self.levels[level as usize - 1][node as usize]);
             while near != 0 {
                 let child = node * WIDTH as u32 + near.trailing_zeros();
                 near &= near - 1;
                 if level > 1 {
                     stack[height] = (level - 1, child);
                     height += 1;
-                    continue;
-                }
-                let leaf = &self.leaves[child as usize];
-                let squares = [
-                    Self::squares::<V>(leaf, centres[0]),
-                    Self::squares::<V>(leaf, centres[1]),
-                    Self::squares::<V>(leaf, centres[2]),
-                ];
-                let mut inside = contend(&squares, bounds);
-                while inside != 0 {
-                    found.push(leaf.indices[inside.trailing_zeros() as usize]);
-                    inside &= inside - 1;
+                } else if !search.take::<V>(&self.leaves[child as usize]) {
+                    return false;
                 }
             }
         }
+        true
+    }
+}
+
+/// What a search does at the nodes of the tree. No closures: they would not inherit the instruction set.
+trait Search {
+    /// The boxes to go into.
+    fn wants<V: Vector>(&self, boxes: &Boxes) -> u8;
+
+    /// Takes what it wants of a leaf. False when that is enough.
+    fn take<V: Vector>(&mut self, leaf: &Leaf) -> bool;
+}
+
+/// See [`PointTree::gather`].
+struct Gather<'a> {
+    low: [f64; 3],
+    high: [f64; 3],
+    bound: f64,
+    most: usize,
+    some: &'a mut SomePoints,
+}
+
+impl Gather<'_> {
+    #[inline(always)]
+    fn reaches<V: Vector>(&self, lows: &[Lanes; 3], highs: &[Lanes; 3]) -> u8 {
+        !V::bits(V::constant(self.bound).less(gap::<V>(lows, highs, self.low, self.high)))
+    }
+}
+
+impl Search for Gather<'_> {
+    #[inline(always)]
+    fn wants<V: Vector>(&self, boxes: &Boxes) -> u8 {
+        self.reaches::<V>(&boxes.low, &boxes.high)
+    }
+
+    #[inline(always)]
+    fn take<V: Vector>(&mut self, leaf: &Leaf) -> bool {
+        let mut inside = self.reaches::<V>(&leaf.points, &leaf.points);
+        while inside != 0 {
+            let lane = inside.trailing_zeros() as usize;
+            inside &= inside - 1;
+            if leaf.indices[lane] != NONE {
+                self.some.push(leaf, lane);
+            }
+        }
+        self.some.count <= self.most
+    }
+}
+
+/// See [`PointTree::contenders`].
+struct Contend<'a> {
+    centres: &'a [[f64; 3]; 3],
+    bounds: &'a [[f64; 3]],
+    found: &'a mut Vec<u32>,
+}
+
+impl Search for Contend<'_> {
+    #[inline(always)]
+    fn wants<V: Vector>(&self, boxes: &Boxes) -> u8 {
+        let [a, b, c] = *self.centres;
+        let distances = [
+            PointTree::distances::<V>(boxes, a),
+            PointTree::distances::<V>(boxes, b),
+            PointTree::distances::<V>(boxes, c),
+        ];
+        contend(&distances, self.bounds)
+    }
+
+    #[inline(always)]
+    fn take<V: Vector>(&mut self, leaf: &Leaf) -> bool {
+        let [a, b, c] = *self.centres;
+        let squares = [
+            PointTree::squares::<V>(leaf, a),
+            PointTree::squares::<V>(leaf, b),
+            PointTree::squares::<V>(leaf, c),
+        ];
+        let mut inside = contend(&squares, self.bounds);
+        while inside != 0 {
+            self.found.push(leaf.indices[inside.trailing_zeros() as usize]);
+            inside &= inside - 1;
+        }
+        true
     }
 }
 
@@ -406,17 +433,9 @@ impl SomePoints {
     /// [`PointTree::contenders`] among these points.
     #[inline(always)]
     pub(crate) fn contenders<V: Vector>(&self, centres: &[[f64; 3]; 3], bounds: &[[f64; 3]], found: &mut Vec<u32>) {
+        let mut contend = Contend { centres, bounds, found };
         for leaf in &self.leaves {
-            let squares = [
-                PointTree::squares::<V>(leaf, centres[0]),
-                PointTree::squares::<V>(leaf, centres[1]),
-                PointTree::squares::<V>(leaf, centres[2]),
-            ];
-            let mut inside = contend(&squares, bounds);
-            while inside != 0 {
-                found.push(leaf.indices[inside.trailing_zeros() as usize]);
-                inside &= inside - 1;
-            }
+            contend.take::<V>(leaf);
         }
     }
 

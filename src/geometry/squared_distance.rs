@@ -17,9 +17,8 @@
 //! where the surface touches the medial axis of the sites along a set of positive area.
 
 use super::point_tree::PointTree;
-use super::restricted_voronoi::{Candidate, Compatibility, Cut, Error, RestrictedVoronoi};
-use crate::linalg::vector3::{add, cross, dot, times};
-use crate::mesh::subtract;
+use super::restricted_voronoi::{Candidate, Compatibility, Cut, Error, RestrictedVoronoi, Visitor};
+use crate::linalg::vector3::{add, cross, dot, subtract, times};
 
 /// Weights the distance along normals.
 #[derive(Clone, Copy, Debug, Default)]
@@ -97,6 +96,7 @@ impl Chunk {
         self.table.fill(u32::MAX);
     }
 
+    #[inline(always)]
     fn slot(&self, site: u32) -> usize {
         // Fibonacci hashing; the table's size is a power of two.
         let mut slot = (site.wrapping_mul(0x9e37_79b9) as usize) & (self.table.len() - 1);
@@ -107,6 +107,7 @@ impl Chunk {
     }
 
     /// The sums of a site.
+    #[inline(always)]
     fn sums(&mut self, site: u32) -> &mut [f64; NUMBERS] {
         if self.table.len() < 2 * (self.sites.len() + 1) {
             let size = (4 * (self.sites.len() + 1)).next_power_of_two().max(64);
@@ -162,7 +163,7 @@ impl SquaredDistance {
     }
 
     /// The value of the term, and what is `wanted`. The value is infinite, and nothing wanted is written, when a
-    /// coordinate is not finite or there are no sites.
+    /// coordinate is not finite or there are no sites; a surface without triangles has the value 0 even then.
     ///
     /// # Panics
     /// When an array has another length than its documentation says.
@@ -216,19 +217,17 @@ impl SquaredDistance {
         let plain = !anisotropic && options.compatibility.is_none() && !(work.surface || work.normals);
         let positions = sites.points();
         self.chunks.iter_mut().for_each(Chunk::clear);
-        let done = self.diagram.sweep(
-            points,
-            sites,
-            options.compatibility,
-            &mut self.chunks,
-            |chunk, cut| piece(chunk, cut, options, work),
-            |chunk, corners, site| {
-                plain && {
-                    triangle(chunk, corners, site, positions[site as usize], work);
-                    true
+        let done = self
+            .diagram
+            .sweep(points, sites, options.compatibility, &mut self.chunks, |chunk| {
+                Integral {
+                    chunk,
+                    options,
+                    work,
+                    plain,
+                    positions,
                 }
-            },
-        );
+            });
         if !done {
             return if self.diagram.cells().is_empty() && sites.is_finite() {
                 0.0
@@ -273,6 +272,32 @@ impl SquaredDistance {
     }
 }
 
+/// Integrates over the pieces of a chunk.
+struct Integral<'a> {
+    chunk: &'a mut Chunk,
+    options: &'a Options<'a>,
+    work: Work,
+    /// Whether whole triangles are done by the short formula.
+    plain: bool,
+    positions: &'a [[f64; 3]],
+}
+
+impl Visitor for Integral<'_> {
+    #[inline(always)]
+    fn whole(&mut self, corners: &[[f64; 3]; 3], site: u32) -> bool {
+        if self.plain {
+            triangle(self.chunk, corners, site, self.positions[site as usize], self.work);
+        }
+        self.plain
+    }
+
+    #[inline(always)]
+    fn piece(&mut self, cut: &Cut<'_>) {
+        piece(self.chunk, cut, self.options, self.work);
+    }
+}
+
+#[inline(always)]
 fn accumulate(sums: &mut [f64; NUMBERS], first: usize, x: [f64; 3]) {
     for axis in 0..3 {
         sums[first + axis] += x[axis];
@@ -286,6 +311,7 @@ struct Normal {
 }
 
 impl Normal {
+    #[inline(always)]
     fn of(options: &Options<'_>, cut: &Cut<'_>, candidate: &Candidate) -> Normal {
         match options.anisotropy {
             Anisotropy::None => Normal {
@@ -312,7 +338,7 @@ impl Normal {
 }
 
 /// Adds a triangle that lies in one cell, for the plain distance and without derivatives by the surface.
-#[inline]
+#[inline(always)]
 fn triangle(chunk: &mut Chunk, corners: &[[f64; 3]; 3], site: u32, position: [f64; 3], work: Work) {
     let [a, b, c] = corners.map(|corner| subtract(corner, position));
     let across = cross(subtract(b, a), subtract(c, a));
@@ -335,6 +361,7 @@ fn triangle(chunk: &mut Chunk, corners: &[[f64; 3]; 3], site: u32, position: [f6
 }
 
 /// Adds one piece to its chunk. All vectors are in the triangle's frame until they are stored.
+#[inline(always)]
 fn piece(chunk: &mut Chunk, cut: &Cut<'_>, options: &Options<'_>, work: Work) {
     let frame = cut.frame;
     let own = &cut.candidates[cut.owner];

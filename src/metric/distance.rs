@@ -21,6 +21,12 @@ use rayon::prelude::*;
 const CHUNK: usize = 64;
 /// Most parts along a triangle's edge: a few huge triangles must not take all time.
 const PARTS: usize = 512;
+/// but with no more parts along an edge than this many times the root of the triangle's area would have,
+const SLENDER: f64 = 8.0;
+/// or than this, whichever is more.
+const FEW_PARTS: usize = 16;
+/// Samples of a surface, beyond which the spacing grows.
+const SAMPLES: f64 = 4e7;
 /// Most pieces that the search for the maximum looks at in one triangle.
 const PIECES: usize = 100_000;
 /// Triangles with a sample beyond this share of the largest are searched to [`SHARP`] of it.
@@ -72,7 +78,7 @@ const fn percent(name: &'static str, symbol: &'static str, definition: &'static 
 /// How finely distances are sampled; lengths in the units of the surfaces.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sampling {
-    /// Largest edge of a part.
+    /// Largest edge of a part, but for slivers and for surfaces that would have more than forty million samples.
     pub spacing: f64,
     /// How far below the certain bound the maximum may stay.
     pub tolerance: f64,
@@ -191,11 +197,12 @@ struct Sums {
 pub fn one_sided(surface: &TriangleMesh, to: &ClosestPoint, sampling: Sampling) -> Distance {
     assert!(!surface.cells.is_empty(), "a surface with at least one triangle");
     let mut cells = vec![0.0; surface.cells.len()];
+    let spacing = affordable(surface, sampling.spacing);
     let sums: Vec<Sums> = surface
         .cells
         .par_chunks(CHUNK)
         .zip(cells.par_chunks_mut(CHUNK))
-        .map(|(triangles, largest)| sample(surface, triangles, to, sampling.spacing, largest))
+        .map(|(triangles, largest)| sample(surface, triangles, to, spacing, largest))
         .collect();
     let (mut area, mut first, mut second, mut samples) = (0.0, 0.0, 0.0, 0);
     let (mut max, mut place) = (0.0, surface.corners(surface.cells[0])[0]);
@@ -259,6 +266,31 @@ pub fn one_sided(surface: &TriangleMesh, to: &ClosestPoint, sampling: Sampling) 
     }
 }
 
+/// How many parts the edges of a triangle are divided into. Slivers have longer parts than the spacing asks for, so that no
+/// triangle has many more samples than its area asks for.
+fn parts(longest: f64, area_vector: [f64; 3], spacing: f64) -> usize {
+    let side = (0.5 * length(area_vector)).sqrt();
+    let most = ((SLENDER * side / spacing).ceil() as usize).clamp(FEW_PARTS, PARTS);
+    ((longest / spacing).ceil() as usize).clamp(1, most)
+}
+
+/// The spacing, or a larger one where a surface is so large that there would be too many samples.
+fn affordable(surface: &TriangleMesh, spacing: f64) -> f64 {
+    let samples: f64 = surface
+        .cells
+        .iter()
+        .map(|&cell| {
+            let [a, b, c] = surface.corners(cell);
+            let longest = length(subtract(b, a))
+                .max(length(subtract(c, b)))
+                .max(length(subtract(a, c)));
+            let parts = parts(longest, area_vector([a, b, c]), spacing) as f64;
+            1.5 * parts * parts
+        })
+        .sum();
+    spacing * (samples / SAMPLES).max(1.0).sqrt()
+}
+
 /// Samples a chunk of triangles at the centres and corners of their parts. Centres weigh 3/4 and corners 1/12, which is exact
 /// for quadratic polynomials.
 fn sample(
@@ -283,7 +315,7 @@ fn sample(
         let [a, b, c] = corners;
         let (first, second) = (subtract(b, a), subtract(c, a));
         let longest = length(first).max(length(second)).max(length(subtract(c, b)));
-        let parts = ((longest / spacing).ceil() as usize).clamp(1, PARTS);
+        let parts = parts(longest, area_vector(corners), spacing);
         points.clear();
         weights.clear();
         let scale = 1.0 / parts as f64;

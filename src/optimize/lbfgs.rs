@@ -4,6 +4,7 @@
 
 use super::line_search::{Start, StrongWolfe};
 use super::{Counters, Iterate, Objective, Observer, Solution, StopReason, Stopping, dot, norm};
+use rayon::prelude::*;
 use std::collections::VecDeque;
 
 pub(super) const SUMMARY: &str =
@@ -151,10 +152,8 @@ impl Lbfgs {
                 gradient: vec![0.0; size],
                 inverse: 0.0,
             });
-            for index in 0..size {
-                pair.point[index] = point[index] - x[index];
-                pair.gradient[index] = ahead[index] - gradient[index];
-            }
+            subtract(&point, &x, &mut pair.point);
+            subtract(&ahead, &gradient, &mut pair.gradient);
             let product = dot(&pair.point, &pair.gradient);
             // Only positive curvature keeps the model positive definite.
             if self.memory > 0 && product > f64::EPSILON * dot(&pair.gradient, &pair.gradient).max(f64::MIN_POSITIVE) {
@@ -181,6 +180,38 @@ impl Lbfgs {
     }
 }
 
+/// From this number of unknowns on, threads share the work on single entries; sums stay in one order.
+const MANY: usize = 1 << 15;
+/// Unknowns for one thread at a time.
+const RUN: usize = 1 << 13;
+
+/// `difference = a - b`.
+fn subtract(a: &[f64], b: &[f64], difference: &mut [f64]) {
+    let run = |(difference, (a, b)): (&mut [f64], (&[f64], &[f64]))| {
+        for (difference, (a, b)) in difference.iter_mut().zip(a.iter().zip(b)) {
+            *difference = a - b;
+        }
+    };
+    if difference.len() < MANY {
+        return run((difference, (a, b)));
+    }
+    let parts = a.par_chunks(RUN).zip(b.par_chunks(RUN));
+    difference.par_chunks_mut(RUN).zip(parts).for_each(run);
+}
+
+/// `sum += factor x`.
+fn add_scaled(sum: &mut [f64], factor: f64, x: &[f64]) {
+    let run = |(sum, x): (&mut [f64], &[f64])| {
+        for (sum, x) in sum.iter_mut().zip(x) {
+            *sum += factor * x;
+        }
+    };
+    if sum.len() < MANY {
+        return run((sum, x));
+    }
+    sum.par_chunks_mut(RUN).zip(x.par_chunks(RUN)).for_each(run);
+}
+
 /// `direction = -H gradient` with the inverse Hessian `H` that the remembered steps stand for.
 fn two_loops(
     objective: &mut (impl Objective + ?Sized),
@@ -195,9 +226,7 @@ fn two_loops(
     }
     for (pair, coefficient) in pairs.iter().zip(coefficients.iter_mut()).rev() {
         *coefficient = pair.inverse * dot(&pair.point, direction);
-        for (direction, change) in direction.iter_mut().zip(&pair.gradient) {
-            *direction -= *coefficient * change;
-        }
+        add_scaled(direction, -*coefficient, &pair.gradient);
     }
     let mut scale = 1.0;
     let preconditioned = objective.is_preconditioned();
@@ -219,8 +248,6 @@ fn two_loops(
     }
     for (pair, &coefficient) in pairs.iter().zip(coefficients.iter()) {
         let correction = coefficient - pair.inverse * dot(&pair.gradient, direction);
-        for (direction, change) in direction.iter_mut().zip(&pair.point) {
-            *direction += correction * change;
-        }
+        add_scaled(direction, correction, &pair.point);
     }
 }

@@ -6,7 +6,8 @@
 //! is affine. A triangle whose three vertices share the nearest site lies in one cell, since cells are convex.
 //!
 //! Guaranteed: the same pieces in the same order with any number of threads; the areas of a triangle's pieces sum to its
-//! area up to rounding, whatever the input. Triangles without area have no pieces. Of several sites in one place the one
+//! area up to 1e-10 of it and 1e-14 of its squared diameter, and where even exact decisions do not achieve that the triangle
+//! is counted ([`Ways::gaps`]). Triangles without area have no pieces. Of several sites in one place the one
 //! with the smallest index has a cell.
 //!
 //! Optionally a site's squared distance to a triangle is increased by `w (1 - n . N)` with the site's normal `n` and the
@@ -14,36 +15,36 @@
 //! diagram on every triangle.
 
 mod clip;
+mod cut;
 mod envelope;
 mod exact;
 mod frame;
+mod nearest;
+mod reach;
 mod subdivide;
 
-pub(crate) use clip::{Candidate, Corner};
-pub(crate) use frame::Frame;
+pub(crate) use clip::Candidate;
+pub(crate) use cut::Cut;
 
 use crate::geometry::hilbert;
 use crate::geometry::point_tree::{PointTree, SomePoints, within_reach};
 use crate::linalg::lanes::Vector;
 use crate::linalg::processor::{Kernel, Processor};
-use crate::mesh::{dot, subtract};
-use clip::{Clipper, Heights, Polygons};
-use envelope::Envelope;
-use exact::ExactClipper;
+use cut::Cutter;
+use nearest::FindNearest;
 use rayon::prelude::*;
-use std::cell::RefCell;
+use reach::{Around, Reach};
 use std::fmt;
 use std::sync::Mutex;
-use subdivide::Subdivision;
 
 /// Triangles, or vertices, treated together by one thread.
 const CHUNK: usize = 512;
+/// Most chunks that a thread takes at once: chunks differ in work, and with more the last thread would keep all waiting.
+const AT_ONCE: usize = 2;
 /// Most triangles, or vertices, whose sites are looked up together,
 const BLOCK: usize = 16;
 /// and most sites that are kept at hand for them.
 const AT_HAND: usize = 96;
-/// Triangles with more candidates are subdivided first.
-const MANY: usize = 48;
 
 /// Why there is no diagram.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -103,137 +104,6 @@ pub struct Compatibility<'a> {
     pub normals: &'a [[f64; 3]],
 }
 
-/// One triangle with the sites that may own a part of it.
-pub(crate) struct Cut<'a> {
-    pub(crate) triangle: u32,
-    pub(crate) frame: &'a Frame,
-    pub(crate) candidates: &'a [Candidate],
-    /// The candidate that owns `polygon`.
-    pub(crate) owner: usize,
-    pub(crate) polygon: &'a [Corner],
-}
-
-/// Memory for one triangle at a time.
-#[derive(Debug, Default)]
-struct Scratch {
-    reaches: Vec<Reach>,
-    some: SomePoints,
-    found: Vec<u32>,
-    candidates: Vec<Candidate>,
-    heights: Heights,
-    some_heights: Heights,
-    rivals: Vec<u32>,
-    polygons: Polygons,
-    clipper: Clipper,
-    envelope: Envelope,
-    exact: ExactClipper,
-    duals: Vec<[f64; 3]>,
-    subdivision: Subdivision,
-}
-
-/// The sites nearest to a triangle's vertices, and how near another one must come to own a part of it.
-#[derive(Clone, Copy, Debug)]
-struct Reach {
-    triangle: u32,
-    corners: [[f64; 3]; 3],
-    near: [u32; 3],
-    /// The one of `near` that is nearest to all three vertices together.
-    reference: u32,
-    /// One row a different site of `near`: no site owns a part that is not closer to some vertex than its entry there.
-    rows: [[f64; 3]; 3],
-    count: usize,
-}
-
-impl Reach {
-    #[inline(always)]
-    fn new(
-        triangle: u32,
-        corners: [[f64; 3]; 3],
-        near: [u32; 3],
-        positions: &[[f64; 3]],
-        offset: impl Fn(u32) -> f64,
-    ) -> Reach {
-        let mut bounds = [[0.0; 3]; 3];
-        for k in 0..3 {
-            bounds[k] = if k > 0 && near[k] == near[k - 1] {
-                bounds[k - 1]
-            } else {
-                Reach::row(&corners, near[k], positions, &offset)
-            };
-        }
-        let sum = |k: usize| bounds[k][0] + bounds[k][1] + bounds[k][2];
-        let mut best = 0;
-        for k in 1..3 {
-            if near[k] != near[best] && (sum(k), near[k]) < (sum(best), near[best]) {
-                best = k;
-            }
-        }
-        let reference = near[best];
-        let mut rows = [bounds[best]; 3];
-        let mut count = 1;
-        for k in 0..3 {
-            if near[k] != reference && !(k == 2 && near[1] == near[2]) {
-                rows[count.min(2)] = bounds[k];
-                count += 1;
-            }
-        }
-        Reach {
-            triangle,
-            corners,
-            near,
-            reference,
-            rows,
-            count: count.min(3),
-        }
-    }
-
-    /// A little more than the squared distances of the corners to a site, for their rounding.
-    #[inline(always)]
-    fn row(corners: &[[f64; 3]; 3], site: u32, positions: &[[f64; 3]], offset: &impl Fn(u32) -> f64) -> [f64; 3] {
-        let position = positions[site as usize];
-        let offset = offset(site);
-        corners.map(|corner| {
-            let difference = subtract(corner, position);
-            (dot(difference, difference) + offset) * (1.0 + 1e-12)
-        })
-    }
-
-    /// The whole triangle belongs to one site.
-    fn is_whole(&self) -> bool {
-        self.count == 1
-    }
-
-    /// No site farther from the triangle's corners than the root of this owns a part.
-    #[inline(always)]
-    fn radius(&self) -> f64 {
-        self.rows[..self.count].iter().fold(f64::INFINITY, |least, row| {
-            least.min(row.iter().fold(0.0, |most: f64, &bound| most.max(bound)))
-        })
-    }
-}
-
-/// A box that grows around points.
-#[derive(Clone, Copy, Debug)]
-struct Around {
-    low: [f64; 3],
-    high: [f64; 3],
-}
-
-impl Around {
-    const NOTHING: Around = Around {
-        low: [f64::INFINITY; 3],
-        high: [f64::NEG_INFINITY; 3],
-    };
-
-    #[inline(always)]
-    fn add(&mut self, point: [f64; 3]) {
-        for axis in 0..3 {
-            self.low[axis] = self.low[axis].min(point[axis]);
-            self.high[axis] = self.high[axis].max(point[axis]);
-        }
-    }
-}
-
 /// How many triangles, or vertices, have their sites looked up together: fewer where sites are dense.
 fn block(things: usize, sites: usize) -> usize {
     if 4 * sites < things {
@@ -245,6 +115,38 @@ fn block(things: usize, sites: usize) -> usize {
     } else {
         1
     }
+}
+
+/// The ways in which a triangle is cut, each for what the one before leaves.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Way {
+    /// All cells at once, along their edges.
+    #[default]
+    Walk,
+    /// Cell by cell.
+    Clip,
+    /// Cell by cell, by exact decisions.
+    Exact,
+}
+
+/// How many triangles were cut in which way.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Ways {
+    /// Lie in one cell.
+    pub whole: usize,
+    pub walked: usize,
+    pub clipped: usize,
+    pub exact: usize,
+    /// Those of `exact` whose pieces do not add up to them.
+    pub gaps: usize,
+}
+
+/// Memory for one chunk at a time.
+#[derive(Debug, Default)]
+struct Scratch {
+    reaches: Vec<Reach>,
+    some: SomePoints,
+    cutter: Cutter,
 }
 
 /// The connectivity of a surface, and memory for diagrams restricted to it. Made once, used for any number of positions of
@@ -259,6 +161,7 @@ pub struct RestrictedVoronoi {
     /// The site nearest to the vertex at the same place of `vertex_order`, and then to every vertex.
     ordered: Vec<u32>,
     nearest: Vec<u32>,
+    first: Way,
     pool: Mutex<Vec<Scratch>>,
 }
 
@@ -296,6 +199,7 @@ impl RestrictedVoronoi {
             vertex_order,
             ordered: vec![0; points.len()],
             nearest: vec![0; points.len()],
+            first: Way::default(),
             pool: Mutex::new(Vec::new()),
         })
     }
@@ -304,13 +208,18 @@ impl RestrictedVoronoi {
         &self.cells
     }
 
+    /// Leaves out the ways before this one, which are quicker. All give the same diagram up to rounding.
+    pub fn begin_with(&mut self, way: Way) {
+        self.first = way;
+    }
+
     /// Chunks of triangles that [`RestrictedVoronoi::sweep`] works through.
     pub(crate) fn chunks(&self) -> usize {
         self.order.len().div_ceil(CHUNK)
     }
 
-    /// Calls `visit` for every piece, in a fixed order. Nothing is visited unless there are sites and all coordinates are
-    /// finite.
+    /// Calls `visit` for every piece, in a fixed order, and counts the ways that were gone. Nothing is visited unless there
+    /// are sites and all coordinates are finite.
     ///
     /// # Panics
     /// When there are not as many points as at the preparation, or not as many normals as sites.
@@ -319,13 +228,12 @@ impl RestrictedVoronoi {
         points: &[[f64; 3]],
         sites: &PointTree,
         compatibility: Option<Compatibility<'_>>,
-        mut visit: impl FnMut(&Piece<'_>),
-    ) {
+        visit: impl FnMut(&Piece<'_>),
+    ) -> Ways {
         if !self.find_nearest(points, sites) {
-            return;
+            return Ways::default();
         }
         let mut scratch = Scratch::default();
-        let (mut polygon, mut labels) = (Vec::new(), Vec::new());
         let triangles: Vec<u32> = (0..self.cells.len() as u32).collect();
         Processor::detect().run(Sweep {
             diagram: self,
@@ -334,63 +242,44 @@ impl RestrictedVoronoi {
             sites,
             compatibility,
             scratch: &mut scratch,
-            visit: |cut: &Cut<'_>| {
-                polygon.clear();
-                labels.clear();
-                let mut doubled = 0.0;
-                for (k, corner) in cut.polygon.iter().enumerate() {
-                    let next = cut.polygon[(k + 1) % cut.polygon.len()];
-                    doubled += corner.u * next.v - corner.v * next.u;
-                    let x = cut.frame.space([corner.u, corner.v, 0.0]);
-                    polygon.push(std::array::from_fn(|axis| cut.frame.origin[axis] + x[axis]));
-                    labels.push(match corner.mark {
-                        mark if mark < 0 => Label::Edge((-1 - mark) as u8),
-                        other => Label::Site(cut.candidates[other as usize].site),
-                    });
-                }
-                visit(&Piece {
-                    triangle: cut.triangle,
-                    site: cut.candidates[cut.owner].site,
-                    polygon: &polygon,
-                    labels: &labels,
-                    area: 0.5 * doubled,
-                });
+            visitor: Shower {
+                visit,
+                polygon: Vec::new(),
+                labels: Vec::new(),
             },
-            whole: |_: &[[f64; 3]; 3], _| false,
         });
+        scratch.cutter.ways
     }
 
-    /// Calls `visit` for every piece, in parallel: chunk `k` of the triangles with `states[k]`. A triangle that lies in the
-    /// cell of one site is first shown to `whole`, as its corners and the site, and not to `visit` if that returns true.
-    pub(crate) fn sweep<State: Send>(
+    /// Shows every piece, in parallel: those of chunk `k` of the triangles to what `visitor` makes of `states[k]`.
+    pub(crate) fn sweep<'s, State: Send, V: Visitor>(
         &mut self,
         points: &[[f64; 3]],
         sites: &PointTree,
         compatibility: Option<Compatibility<'_>>,
-        states: &mut [State],
-        visit: impl Fn(&mut State, &Cut<'_>) + Sync,
-        whole: impl Fn(&mut State, &[[f64; 3]; 3], u32) -> bool + Sync,
+        states: &'s mut [State],
+        visitor: impl Fn(&'s mut State) -> V + Sync,
     ) -> bool {
         if !self.find_nearest(points, sites) {
             return false;
         }
         let this = &*self;
         let processor = Processor::detect();
-        this.order.par_chunks(CHUNK).zip(states).for_each(|(triangles, state)| {
-            let state = RefCell::new(state);
-            let mut scratch = this.take();
-            processor.run(Sweep {
-                diagram: this,
-                triangles,
-                points,
-                sites,
-                compatibility,
-                scratch: &mut scratch,
-                visit: |cut: &Cut<'_>| visit(&mut **state.borrow_mut(), cut),
-                whole: |corners: &[[f64; 3]; 3], site| whole(&mut **state.borrow_mut(), corners, site),
+        (this.order.par_chunks(CHUNK).zip(states))
+            .with_max_len(AT_ONCE)
+            .for_each(|(triangles, state)| {
+                let mut scratch = this.take();
+                processor.run(Sweep {
+                    diagram: this,
+                    triangles,
+                    points,
+                    sites,
+                    compatibility,
+                    scratch: &mut scratch,
+                    visitor: visitor(state),
+                });
+                this.give(scratch);
             });
-            this.give(scratch);
-        });
         true
     }
 
@@ -425,6 +314,7 @@ impl RestrictedVoronoi {
         this.vertex_order
             .par_chunks(CHUNK)
             .zip(ordered.par_chunks_mut(CHUNK))
+            .with_max_len(AT_ONCE)
             .for_each(|(vertices, found)| {
                 let mut scratch = this.take();
                 processor.run(FindNearest {
@@ -432,7 +322,7 @@ impl RestrictedVoronoi {
                     block,
                     points,
                     sites,
-                    scratch: &mut scratch,
+                    some: &mut scratch.some,
                     found,
                 });
                 this.give(scratch);
@@ -451,221 +341,73 @@ impl RestrictedVoronoi {
         let corners = cell.map(|vertex| points[vertex]);
         let near = cell.map(|vertex| self.nearest[vertex]);
         if near[0] == near[1] && near[0] == near[2] {
-            // Cells are convex. Rows are needed where normals matter only, and are then made anew.
-            return Reach {
-                triangle,
-                corners,
-                near,
-                reference: near[0],
-                rows: [[0.0; 3]; 3],
-                count: 1,
-            };
+            return Reach::whole(triangle, corners, near[0]);
         }
         Reach::new(triangle, corners, near, sites.points(), |_| 0.0)
     }
+}
 
-    /// Cuts one triangle, whose sites are `at_hand` if so it says.
+/// What is done with the pieces. No closures: they would not inherit the instruction set, and its functions must be
+/// `#[inline(always)]` to do so.
+pub(crate) trait Visitor {
+    /// A triangle that lies in the cell of one site: true if that is all the visitor wants to know of it. Not asked with
+    /// normals in the distance.
+    fn whole(&mut self, corners: &[[f64; 3]; 3], site: u32) -> bool;
+
+    fn piece(&mut self, cut: &Cut<'_>);
+}
+
+/// Shows pieces in space.
+struct Shower<Visit> {
+    visit: Visit,
+    polygon: Vec<[f64; 3]>,
+    labels: Vec<Label>,
+}
+
+impl<Visit: FnMut(&Piece<'_>)> Visitor for Shower<Visit> {
     #[inline(always)]
-    fn cut<V: Vector>(
-        &self,
-        reach: &Reach,
-        at_hand: bool,
-        sites: &PointTree,
-        compatibility: Option<Compatibility<'_>>,
-        scratch: &mut Scratch,
-        visit: &mut impl FnMut(&Cut<'_>),
-    ) {
-        let corners = reach.corners;
-        let Some(frame) = Frame::new(corners) else { return };
-        let Scratch {
-            reaches: _,
-            some,
-            found,
-            candidates,
-            heights,
-            some_heights,
-            rivals,
-            polygons,
-            clipper,
-            envelope,
-            exact,
-            duals,
-            subdivision,
-        } = scratch;
-        let positions = sites.points();
-        let offset = |site: u32| {
-            compatibility.map_or(0.0, |compatibility| {
-                let normal = compatibility.normals[site as usize];
-                compatibility.weight * (1.0 - dot(normal, frame.normal)).max(0.0)
-            })
-        };
-        let reach = match compatibility {
-            None => *reach,
-            Some(_) => Reach::new(reach.triangle, corners, reach.near, positions, offset),
-        };
-        let reference = reach.reference;
-        found.clear();
-        if compatibility.is_some() || !reach.is_whole() {
-            let rows = &reach.rows[..reach.count];
-            if at_hand {
-                some.contenders::<V>(&corners, rows, found);
-            } else {
-                sites.contenders::<V>(&corners, rows, found);
-            }
-            if compatibility.is_some() {
-                if !found.contains(&reference) {
-                    found.push(reference);
-                }
-                // Sites in one place may differ by their normals.
-                for place in 0..found.len() {
-                    let mut site = found[place];
-                    while let Some(twin) = sites.twin(site) {
-                        found.push(twin);
-                        site = twin;
-                    }
-                }
-            }
-        }
-        let origin = positions[reference as usize];
-        let reference_offset = offset(reference);
-        let mut scale = 0.0f64;
-        candidates.clear();
-        let to_origin = subtract(origin, frame.origin);
-        let mut add = |site: u32| {
-            let y = positions[site as usize];
-            let difference = subtract(y, origin);
-            let from_origin = subtract(y, frame.origin);
-            let middle = [
-                from_origin[0] + to_origin[0],
-                from_origin[1] + to_origin[1],
-                from_origin[2] + to_origin[2],
-            ];
-            let offset = offset(site);
-            scale = scale.max(size(difference) * (size(middle) + 2.0 * frame.diameter) + offset + reference_offset);
-            candidates.push(Candidate {
-                site,
-                height: [
-                    -2.0 * dot(difference, frame.tangents[0]),
-                    -2.0 * dot(difference, frame.tangents[1]),
-                    dot(difference, middle) + (offset - reference_offset),
-                ],
-                local: frame.local(from_origin),
-                offset,
-            });
-        };
-        add(reference);
-        for &site in found.iter() {
-            if site != reference {
-                add(site);
-            }
-        }
-        polygons.clear();
-        if candidates.len() == 1 {
-            polygons.push(0, &Clipper::triangle(&frame));
-        } else {
-            heights.clear();
-            for candidate in candidates.iter() {
-                heights.push(candidate.height);
-            }
-            // Differences of height functions below this are rounding.
-            let tolerance = 32.0 * f64::EPSILON * scale;
-            let few = candidates.len() <= MANY;
-            // Polygons that overlap or leave gaps betray themselves by their areas.
-            let allowed = 1e-10 * frame.area + 1e-14 * frame.diameter * frame.diameter;
-            let whole = |polygons: &Polygons| (polygons.area - frame.area).abs() <= allowed;
-            let walked = few && envelope.cells::<V>(&frame, heights, polygons) && whole(polygons);
-            if !walked {
-                polygons.clear();
-            }
-            if walked {
-            } else if few {
-                let start = Clipper::corners::<V>(&frame, heights);
-                for owner in 0..candidates.len() {
-                    let polygon = clipper.cell::<V>(&start, heights, owner, tolerance);
-                    if polygon.len() >= 3 {
-                        polygons.push(owner, polygon);
-                    }
-                }
-            } else {
-                subdivision.divide(&frame, heights, tolerance);
-                for owner in 0..candidates.len() {
-                    subdivision.rivals(owner, rivals);
-                    if rivals.is_empty() {
-                        continue;
-                    }
-                    some_heights.clear();
-                    for &rival in rivals.iter() {
-                        some_heights.push(candidates[rival as usize].height);
-                    }
-                    let start = Clipper::corners::<V>(&frame, some_heights);
-                    let polygon = clipper.cell::<V>(&start, some_heights, 0, tolerance);
-                    if polygon.len() >= 3 && heights.owns::<V>(polygon, owner, tolerance) {
-                        polygons.push_renamed(owner, polygon, rivals);
-                    }
-                }
-            }
-            if !whole(polygons) {
-                polygons.clear();
-                // Of equal functions the first one owns: the one with the smallest index.
-                candidates.sort_unstable_by_key(|candidate| candidate.site);
-                duals.clear();
-                duals.extend(candidates.iter().map(|candidate| exact::dual(&frame, candidate.height)));
-                if few {
-                    rivals.clear();
-                    rivals.extend(0..candidates.len() as u32);
-                } else {
-                    heights.clear();
-                    for candidate in candidates.iter() {
-                        heights.push(candidate.height);
-                    }
-                    subdivision.divide(&frame, heights, tolerance);
-                }
-                for owner in 0..candidates.len() {
-                    if !few {
-                        subdivision.rivals(owner, rivals);
-                        if rivals.is_empty() {
-                            continue;
-                        }
-                    }
-                    let polygon = exact.cell(&frame, duals, owner, rivals);
-                    if polygon.len() >= 3 && (few || heights.owns::<V>(polygon, owner, tolerance)) {
-                        polygons.push(owner, polygon);
-                    }
-                }
-            }
-        }
-        for &(owner, start, end) in &polygons.parts {
-            visit(&Cut {
-                triangle: reach.triangle,
-                frame: &frame,
-                candidates,
-                owner: owner as usize,
-                polygon: &polygons.corners[start as usize..end as usize],
+    fn whole(&mut self, _: &[[f64; 3]; 3], _: u32) -> bool {
+        false
+    }
+
+    #[inline(always)]
+    fn piece(&mut self, cut: &Cut<'_>) {
+        self.polygon.clear();
+        self.labels.clear();
+        let mut doubled = 0.0;
+        for (k, corner) in cut.polygon.iter().enumerate() {
+            let next = cut.polygon[(k + 1) % cut.polygon.len()];
+            doubled += corner.u * next.v - corner.v * next.u;
+            let x = cut.frame.space([corner.u, corner.v, 0.0]);
+            self.polygon
+                .push(std::array::from_fn(|axis| cut.frame.origin[axis] + x[axis]));
+            self.labels.push(match corner.mark {
+                mark if mark < 0 => Label::Edge((-1 - mark) as u8),
+                other => Label::Site(cut.candidates[other as usize].site),
             });
         }
+        (self.visit)(&Piece {
+            triangle: cut.triangle,
+            site: cut.candidates[cut.owner].site,
+            polygon: &self.polygon,
+            labels: &self.labels,
+            area: 0.5 * doubled,
+        });
     }
 }
 
-/// Sum of magnitudes.
-#[inline(always)]
-fn size(x: [f64; 3]) -> f64 {
-    x[0].abs() + x[1].abs() + x[2].abs()
-}
-
 /// Cuts a chunk of triangles in vector registers.
-struct Sweep<'a, Visit, Whole> {
+struct Sweep<'a, Pieces> {
     diagram: &'a RestrictedVoronoi,
     triangles: &'a [u32],
     points: &'a [[f64; 3]],
     sites: &'a PointTree,
     compatibility: Option<Compatibility<'a>>,
     scratch: &'a mut Scratch,
-    visit: Visit,
-    /// Takes a triangle that lies in the cell of one site, if it likes.
-    whole: Whole,
+    visitor: Pieces,
 }
 
-impl<Visit: FnMut(&Cut<'_>), Whole: FnMut(&[[f64; 3]; 3], u32) -> bool> Kernel for Sweep<'_, Visit, Whole> {
+impl<Pieces: Visitor> Kernel for Sweep<'_, Pieces> {
     #[inline(always)]
     fn run<V: Vector>(mut self) {
         let diagram = self.diagram;
@@ -687,97 +429,22 @@ impl<Visit: FnMut(&Cut<'_>), Whole: FnMut(&[[f64; 3]; 3], u32) -> bool> Kernel f
             let at_hand =
                 count > 1 && (self.sites).gather::<V>(around.low, around.high, bound, AT_HAND, &mut self.scratch.some);
             for reach in &reaches {
-                if self.compatibility.is_none() && reach.is_whole() && (self.whole)(&reach.corners, reach.reference) {
+                if self.compatibility.is_none()
+                    && reach.is_whole()
+                    && self.visitor.whole(&reach.corners, reach.reference)
+                {
                     continue;
                 }
-                diagram.cut::<V>(
+                self.scratch.cutter.cut::<V>(
                     reach,
-                    at_hand,
+                    at_hand.then_some(&self.scratch.some),
                     self.sites,
                     self.compatibility,
-                    self.scratch,
-                    &mut self.visit,
+                    diagram.first,
+                    &mut self.visitor,
                 );
             }
         }
         self.scratch.reaches = reaches;
-    }
-}
-
-/// Finds the sites nearest to a chunk of vertices.
-struct FindNearest<'a> {
-    vertices: &'a [u32],
-    block: usize,
-    points: &'a [[f64; 3]],
-    sites: &'a PointTree,
-    scratch: &'a mut Scratch,
-    /// Holds the sites that were nearest the last time, which are good guesses.
-    found: &'a mut [u32],
-}
-
-impl FindNearest<'_> {
-    // No closure: it would not inherit the instruction set.
-    #[inline(always)]
-    fn nearest<V: Vector>(&self, vertex: u32, hint: Option<u32>, before: u32) -> u32 {
-        let x = self.points[vertex as usize];
-        let sites = self.sites.points();
-        let hint = match (hint, sites.get(before as usize)) {
-            (Some(hint), Some(&old)) => {
-                let (here, there) = (subtract(sites[hint as usize], x), subtract(old, x));
-                Some(if dot(there, there) < dot(here, here) {
-                    before
-                } else {
-                    hint
-                })
-            }
-            (None, Some(_)) => Some(before),
-            (hint, None) => hint,
-        };
-        // There are sites, so there is a nearest one.
-        self.sites.nearest_in::<V>(x, hint).map_or(0, |(site, _)| site)
-    }
-}
-
-impl Kernel for FindNearest<'_> {
-    #[inline(always)]
-    fn run<V: Vector>(mut self) {
-        let mut some = std::mem::take(&mut self.scratch.some);
-        let found = std::mem::take(&mut self.found);
-        let mut hint = None;
-        for (vertices, found) in self.vertices.chunks(self.block).zip(found.chunks_mut(self.block)) {
-            let first = self.nearest::<V>(vertices[0], hint, found[0]);
-            hint = Some(first);
-            found[0] = first;
-            if vertices.len() == 1 {
-                continue;
-            }
-            let position = self.sites.points()[first as usize];
-            let square = |vertex: u32| {
-                let difference = subtract(position, self.points[vertex as usize]);
-                dot(difference, difference)
-            };
-            let mut around = Around::NOTHING;
-            let mut bound = 0.0f64;
-            for &vertex in &vertices[1..] {
-                around.add(self.points[vertex as usize]);
-                bound = bound.max(square(vertex));
-            }
-            if self
-                .sites
-                .gather::<V>(around.low, around.high, bound, AT_HAND, &mut some)
-            {
-                for (&vertex, found) in vertices.iter().zip(found).skip(1) {
-                    *found = some
-                        .nearest::<V>(self.points[vertex as usize], (square(vertex), first))
-                        .1;
-                }
-            } else {
-                for (&vertex, found) in vertices.iter().zip(found).skip(1) {
-                    *found = self.nearest::<V>(vertex, hint, *found);
-                    hint = Some(*found);
-                }
-            }
-        }
-        self.scratch.some = some;
     }
 }

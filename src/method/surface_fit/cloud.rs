@@ -32,9 +32,18 @@ pub fn read(name: &str, bytes: &[u8]) -> Result<Option<Vec<[f64; 3]>>, String> {
         )
     })?;
     let mut points = Vec::new();
+    let mut announced = None;
     for (line, row) in text.lines().enumerate() {
         let row = row.trim();
         if row.is_empty() || row.starts_with('#') {
+            continue;
+        }
+        if points.is_empty()
+            && announced.is_none()
+            && let Ok(count) = row.parse::<usize>()
+        {
+            // The first line may be a count.
+            announced = Some(count);
             continue;
         }
         let mut words = row.split_whitespace();
@@ -46,8 +55,6 @@ pub fn read(name: &str, bytes: &[u8]) -> Result<Option<Vec<[f64; 3]>>, String> {
         };
         match [number(), number(), number()] {
             [Some(x), Some(y), Some(z)] => points.push([x, y, z]),
-            // The first line may be a count.
-            [Some(_), None, None] if points.is_empty() => {}
             _ => {
                 let shown: String = row.chars().take(40).collect();
                 return Err(format!(
@@ -56,6 +63,12 @@ pub fn read(name: &str, bytes: &[u8]) -> Result<Option<Vec<[f64; 3]>>, String> {
                 ));
             }
         }
+    }
+    if let Some(count) = announced.filter(|&count| count != points.len()) {
+        return Err(format!(
+            "{name}: the first line announces {count} points and {} follow; complete the file or mend the count",
+            points.len()
+        ));
     }
     Ok(Some(points))
 }

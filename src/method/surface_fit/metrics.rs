@@ -57,12 +57,29 @@ const OWN: &[Metric] = &[
         "Mean over the faces of the fit of their scaled Jacobians.",
     ),
     metric(
+        "unevenness",
+        "R_P",
+        "",
+        Some(0.0),
+        Better::Lower,
+        "|P L X|^2, the part of |L X|^2 along the fit, by the normals at the start of the last stage; the target scaled to \
+         diagonal 1.",
+    ),
+    metric(
+        "folded_faces",
+        "n_fold",
+        "",
+        Some(0.0),
+        Better::Lower,
+        "Number of faces of the fit with a scaled Jacobian of 0 or less.",
+    ),
+    metric(
         "energy",
         "F",
         "",
         Some(0.0),
         Better::Lower,
-        "What the last stage minimizes, the target scaled to diagonal 1: both terms and the regularizer with its factor.",
+        "What the last stage minimizes, the target scaled to diagonal 1: both terms and the regularizers with their factors.",
     ),
     metric(
         "target_to_fit",

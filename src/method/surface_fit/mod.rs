@@ -1,6 +1,6 @@
 //! Surface fitting by Voronoi squared distance minimization: a mesh, or the control mesh of a Catmull-Clark surface, onto
-//! a target of triangles that need not hang together, or of points alone. Source: Nivoliers, Yan, Lévy 2012, Fitting polynomial surfaces to
-//! triangular meshes with Voronoi squared distance minimization.
+//! a target of triangles that need not hang together, or of points alone. Source: Nivoliers, Yan, Lévy 2012, Fitting
+//! polynomial surfaces to triangular meshes with Voronoi squared distance minimization.
 //!
 //! The stages: [`problem`] reads the model and scales it, [`sampling`] samples the target, [`objective`] is minimized by
 //! L-BFGS through a schedule of anisotropy and regularization, [`outcome`] measures the fit.
@@ -45,7 +45,7 @@ impl Method for SurfaceFit {
     }
 
     fn version(&self) -> u32 {
-        2
+        3
     }
 
     fn summary(&self) -> &'static str {
@@ -120,9 +120,36 @@ pub fn fitted_mesh(control: &Surface, creases: &[[u32; 2]], settings: &Settings)
     (fitted, map)
 }
 
+/// Most faces of a fitted mesh.
+const MOST_FACES: f64 = 2e7;
+
+/// Refuses what would have more faces than memory.
+fn check_size(template: &Surface, settings: &Settings) -> Result<(), Failure> {
+    let levels = settings.subdivisions + settings.refinements;
+    // A face with k corners becomes k quadrilaterals, each of them four.
+    let corners = (4 * template.quads.len() + 3 * template.triangles.len()) as f64;
+    let faces = if levels == 0 {
+        template.faces() as f64
+    } else {
+        corners * 4f64.powi(levels as i32 - 1)
+    };
+    if faces > MOST_FACES {
+        return Err(Failure {
+            kind: "invalid-input".to_string(),
+            reason: format!(
+                "a template of {} faces, subdivided {levels} times (subdivisions and refinements), has {faces:.1e} faces; \
+                 {MOST_FACES:e} are the limit: take a coarser template or fewer levels",
+                template.faces()
+            ),
+        });
+    }
+    Ok(())
+}
+
 /// Fits the template of a problem to its target.
 pub fn run(problem: &Problem, settings: &Settings, observer: &mut dyn Observer) -> Result<Outcome, Failure> {
     let mut notices = problem.notices.clone();
+    check_size(&problem.template, settings)?;
     let mut control = problem.template.clone();
     let mut creases = control.creases(settings.crease_angle);
     let stages = settings.stages();
@@ -139,6 +166,8 @@ pub fn run(problem: &Problem, settings: &Settings, observer: &mut dyn Observer) 
     };
     let mut samples = take_samples(fitted.points.len(), observer)?;
     let mut parts = objective::Parts::default();
+    let mut reached = stages[0];
+    let total = (stages.len() + settings.refinements) as u64;
     'rounds: for round in 0..=settings.refinements {
         if round > 0 {
             observer.phase("refine");
@@ -164,6 +193,7 @@ pub fn run(problem: &Problem, settings: &Settings, observer: &mut dyn Observer) 
         )?;
         let mut x = control.points.as_flattened().to_vec();
         for &stage in &stages[first..] {
+            reached = stage;
             objective.set_stage(stage);
             let lbfgs = Lbfgs {
                 stopping: Stopping {
@@ -188,6 +218,15 @@ pub fn run(problem: &Problem, settings: &Settings, observer: &mut dyn Observer) 
             counters += solution.counters;
             minimizations += 1;
             (stop, reason) = (solution.stop, solution.reason);
+            if total > 1 {
+                reason = format!("stage {minimizations} of {total}: {reason}");
+            }
+            if stop == StopReason::StepLimit && minimizations < total {
+                notices.push(format!(
+                    "stage {} of {total} ended at its limit of {} iterations",
+                    minimizations, settings.iteration_limit
+                ));
+            }
             if matches!(
                 stop,
                 StopReason::TimeLimit | StopReason::Cancelled | StopReason::NotFinite
@@ -197,6 +236,9 @@ pub fn run(problem: &Problem, settings: &Settings, observer: &mut dyn Observer) 
         }
         objective.value(&x);
         parts = objective.latest().get();
+        if let Some(reason) = objective.without_preconditioner() {
+            notices.push(format!("minimized without the preconditioner: {reason}"));
+        }
         let (points, _) = x.as_chunks();
         control.points = points.to_vec();
         map.apply(&control.points, &mut fitted.points);
@@ -209,8 +251,7 @@ pub fn run(problem: &Problem, settings: &Settings, observer: &mut dyn Observer) 
     }
 
     observer.phase("measure");
-    let last = stages[stages.len() - 1];
-    let measured = outcome::measure(problem, settings, &samples, &fitted, parts, last)?;
+    let measured = outcome::measure(problem, settings, &samples, &fitted, parts, reached)?;
     notices.extend(measured.notices);
     let mut metrics = measured.metrics;
     metrics.insert("control_vertices".to_string(), control.points.len() as f64);

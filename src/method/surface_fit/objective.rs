@@ -25,6 +25,8 @@ pub struct Parts {
     pub to_target: f64,
     /// `|L X|^2`, without its factor.
     pub regularizer: f64,
+    /// `|P L X|^2`, without its factor.
+    pub unevenness: f64,
 }
 
 /// What the second term runs over.
@@ -61,14 +63,22 @@ pub struct FitObjective<'a> {
     normals: Vec<[f64; 3]>,
     areas: Vec<[f64; 3]>,
     turns: Vec<[f64; 3]>,
+    /// Of the fit at the start of the stage; once it is known.
+    tangents: Option<Vec<Tangent>>,
+    boundary: Vec<bool>,
     control: Vec<[f64; 3]>,
     preconditioner: Option<Preconditioner>,
+    /// Why there is no preconditioner though one was asked for.
+    without: Option<String>,
     blocks: Vec<Block>,
     /// Unit normals of the target's triangles, zero where there is none.
     target_normals: Vec<[f64; 3]>,
     /// Evaluations since the preconditioner was made.
     age: usize,
 }
+
+/// The projection along the fit at one of its points, by the unit normal there: none without a normal.
+pub type Tangent = Option<[f64; 3]>;
 
 /// Evaluations after which the preconditioner is made anew.
 const AGE: usize = 5;
@@ -110,16 +120,24 @@ impl<'a> FitObjective<'a> {
                 reason: format!("{role}: {error}"),
             })
         };
-        let edges: Vec<[u32; 2]> = fitted.edges().into_iter().map(|edge| edge.ends).collect();
         let count = fitted.points.len();
+        let all_edges = fitted.edges();
+        let mut boundary = vec![false; count];
+        for edge in all_edges.iter().filter(|edge| edge.faces.len() == 1) {
+            edge.ends.iter().for_each(|&end| boundary[end as usize] = true);
+        }
+        let edges: Vec<[u32; 2]> = all_edges.into_iter().map(|edge| edge.ends).collect();
         let mut degrees = vec![0.0; count];
         for &end in edges.as_flattened() {
             degrees[end as usize] += 1.0;
         }
-        let preconditioner = match settings.preconditioner {
-            Preconditioning::None => None,
-            // Without one the minimization is slower and no less sound.
-            Preconditioning::Hessian => Preconditioner::new(map, &edges, &degrees, control).ok(),
+        // Without one the minimization is slower and no less sound.
+        let (preconditioner, without) = match settings.preconditioner {
+            Preconditioning::None => (None, None),
+            Preconditioning::Hessian => match Preconditioner::new(map, &edges, &degrees, control) {
+                Ok(preconditioner) => (Some(preconditioner), None),
+                Err(reason) => (None, Some(reason)),
+            },
         };
         let target_normals = target.cells.iter().map(|&cell| {
             let area = area_vector(target.corners(cell));
@@ -128,6 +146,7 @@ impl<'a> FitObjective<'a> {
         });
         Ok(FitObjective {
             preconditioner,
+            without,
             blocks: vec![[0.0; 6]; count],
             target_normals: target_normals.collect(),
             age: AGE,
@@ -157,6 +176,8 @@ impl<'a> FitObjective<'a> {
             normals: vec![[0.0; 3]; count],
             areas: vec![[0.0; 3]; count],
             turns: vec![[0.0; 3]; count],
+            tangents: None,
+            boundary,
             control: vec![[0.0; 3]; map.columns()],
         })
     }
@@ -166,8 +187,14 @@ impl<'a> FitObjective<'a> {
         self.latest.clone()
     }
 
+    /// Why the minimization goes without the preconditioner that was asked for, if it does.
+    pub fn without_preconditioner(&self) -> Option<&str> {
+        self.without.as_deref()
+    }
+
     pub fn set_stage(&mut self, stage: Stage) {
         self.stage = stage;
+        self.tangents = None;
         self.age = AGE;
     }
 
@@ -214,11 +241,16 @@ impl<'a> FitObjective<'a> {
                 pull(piece.site, piece.area, normals[piece.triangle as usize]);
             });
         }
-        if preconditioner
-            .refresh(self.map, &self.blocks, self.stage.regularization)
-            .is_err()
-        {
+        let made = preconditioner.refresh(
+            self.map,
+            &self.blocks,
+            self.stage.regularization,
+            self.stage.evenness,
+            self.tangents.as_deref().unwrap_or_default(),
+        );
+        if let Err(reason) = made {
             self.preconditioner = None;
+            self.without = Some(reason);
         }
     }
 
@@ -294,15 +326,39 @@ impl<'a> FitObjective<'a> {
                 }
             }
         }
-        // |L X|^2 and its gradient 2 L L X; L is symmetric.
+        // |L X|^2 and its gradient 2 L L X, |P L X|^2 and its gradient 2 L P L X; L is symmetric.
         apply_laplacian(&self.edges, &self.degrees, &self.points, &mut self.laplacian);
         parts.regularizer = self.laplacian.as_flattened().iter().map(|x| x * x).sum();
-        if with_gradient && self.stage.regularization > 0.0 {
+        let Stage {
+            regularization,
+            evenness,
+            ..
+        } = self.stage;
+        let tangents = match &self.tangents {
+            Some(tangents) => tangents,
+            None => {
+                self.find_normals();
+                let tangents = self.normals.iter().zip(&self.boundary);
+                let tangents = tangents.map(|(&normal, &boundary)| (!boundary && normal != [0.0; 3]).then_some(normal));
+                self.tangents.insert(tangents.collect())
+            }
+        };
+        for (bend, tangent) in self.laplacian.iter_mut().zip(tangents) {
+            let mut along = [0.0; 3];
+            if let Some(n) = tangent {
+                let out = dot(*bend, *n);
+                along = std::array::from_fn(|axis| bend[axis] - out * n[axis]);
+                parts.unevenness += dot(along, along);
+            }
+            *bend = std::array::from_fn(|axis| regularization * bend[axis] + evenness * along[axis]);
+        }
+        if with_gradient && regularization.max(evenness) > 0.0 {
             apply_laplacian(&self.edges, &self.degrees, &self.laplacian, &mut self.term);
-            add_to(&mut self.gradient, &self.term, 2.0 * self.stage.regularization);
+            add_to(&mut self.gradient, &self.term, 2.0);
         }
         self.latest.set(parts);
-        let value = parts.to_target + parts.from_target + self.stage.regularization * parts.regularizer;
+        let value =
+            parts.to_target + parts.from_target + regularization * parts.regularizer + evenness * parts.unevenness;
         if value.is_finite() { value } else { f64::INFINITY }
     }
 

@@ -87,6 +87,8 @@ pub fn measure(
         "scaled_jacobian_min",
         jacobians.iter().copied().fold(f64::INFINITY, f64::min),
     );
+    let folded = jacobians.iter().filter(|&&jacobian| !(jacobian > 0.0)).count();
+    set("folded_faces", folded as f64);
     set(
         "scaled_jacobian_mean",
         jacobians.iter().sum::<f64>() / jacobians.len() as f64,
@@ -94,9 +96,13 @@ pub fn measure(
     set("target_to_fit", parts.from_target);
     set("fit_to_target", parts.to_target);
     set("regularizer", parts.regularizer);
+    set("unevenness", parts.unevenness);
     set(
         "energy",
-        parts.from_target + parts.to_target + stage.regularization * parts.regularizer,
+        parts.from_target
+            + parts.to_target
+            + stage.regularization * parts.regularizer
+            + stage.evenness * parts.unevenness,
     );
     let area = triangulated.area();
     set(
@@ -130,6 +136,13 @@ pub fn measure(
     set("template_euler", template_euler as f64);
 
     let mut notices = Vec::new();
+    if folded > 0 {
+        notices.push(format!(
+            "{folded} of {} faces are folded (scaled Jacobian 0 or less); a larger `evenness` or `regularization` unfolds \
+             them at some cost of distance",
+            jacobians.len()
+        ));
+    }
     if closed && !no_surface && target_euler != template_euler {
         notices.push(format!(
             "the closed target has the Euler characteristic {target_euler}, the template {template_euler}: no template of \

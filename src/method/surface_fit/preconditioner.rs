@@ -1,12 +1,17 @@
 //! A positive definite model of the Hessian of the fit's energy, factorized: what L-BFGS starts its own model from.
 //!
 //! With the cells held still both terms are quadratic in the fitted points: a piece of area `a` pulls a point with
-//! `a (I + (s^2 - 1) n n^T)`. These blocks `B`, one a fitted point, and the regularizer give `2 M^T (B + lambda L^2) M` over
-//! the control points. Normal and tangential stiffness differ by `s^2`, 2500 by default, which no step of plain L-BFGS
-//! copes with. The blocks follow the fit: they are made anew every few evaluations.
+//! `a (I + (s^2 - 1) n n^T)`. These blocks `B`, one a fitted point, and the regularizers give
+//! `2 M^T (B + lambda L^2 + mu L P L) M` over the control points, with the projections `P` along the fit. Normal and
+//! tangential stiffness differ by `s^2`, 2500 by default, which no step of plain L-BFGS copes with. The blocks follow the fit:
+//! they are made anew every few evaluations.
 
+use super::objective::Tangent;
 use crate::linalg::sparse::{BlockCholesky, BlockPattern};
 use crate::mesh::linear_map::LinearMap;
+
+/// Most couplings that are added up.
+const MOST: usize = 100_000_000;
 
 /// A symmetric 3x3 block: xx, xy, xz, yy, yz, zz.
 pub type Block = [f64; 6];
@@ -21,6 +26,9 @@ pub struct Preconditioner {
     places: Vec<u32>,
     /// Entries of `M^T L^2 M` at these places.
     laplacian: Vec<f64>,
+    /// `L M`, and for every two entries of a row the place of their block.
+    bent: LinearMap,
+    bent_places: Vec<u32>,
     sums: Vec<Block>,
     parts: Vec<f64>,
     values: Vec<f64>,
@@ -47,6 +55,15 @@ impl Preconditioner {
             rows[b as usize].extend(map.row(a as usize).iter().map(|&(c, w)| (c, -w)));
         }
         let bent = LinearMap::from_rows(count, rows.into_iter());
+        // A vertex with many neighbours couples them all.
+        let pairs: usize = (0..map.rows())
+            .map(|row| bent.row(row).len().pow(2) / 2 + map.row(row).len().pow(2) / 2)
+            .sum();
+        if pairs > MOST {
+            return Err(format!(
+                "{pairs} couplings of control points are more than the {MOST} it may have"
+            ));
+        }
         let mut neighbours: Vec<Vec<u32>> = vec![Vec::new(); count];
         let mut couple = |row: &[(u32, f64)]| {
             for (index, &(a, _)) in row.iter().enumerate() {
@@ -94,10 +111,12 @@ impl Preconditioner {
         };
         let mut laplacian = vec![0.0; count + pairs.len()];
         let mut places = Vec::new();
+        let mut bent_places = Vec::new();
         for row in 0..map.rows() {
             for (index, &(a, w)) in bent.row(row).iter().enumerate() {
                 for &(b, v) in &bent.row(row)[index..] {
                     laplacian[place(a, b)] += w * v;
+                    bent_places.push(place(a, b) as u32);
                 }
             }
             for (index, &(a, _)) in map.row(row).iter().enumerate() {
@@ -113,28 +132,49 @@ impl Preconditioner {
             pairs,
             places,
             laplacian,
+            bent,
+            bent_places,
         })
     }
 
-    /// Factorizes the model with a block for every fitted point and the factor `lambda` of the regularizer.
+    /// Factorizes the model with a block for every fitted point, and the factors `lambda` and `mu` of the regularizer and of
+    /// its part along the fit.
     ///
     /// # Errors
     /// When it cannot be factorized.
-    pub fn refresh(&mut self, map: &LinearMap, blocks: &[Block], lambda: f64) -> Result<(), String> {
+    pub fn refresh(
+        &mut self,
+        map: &LinearMap,
+        blocks: &[Block],
+        lambda: f64,
+        mu: f64,
+        tangents: &[Tangent],
+    ) -> Result<(), String> {
         for (sum, entry) in self.sums.iter_mut().zip(&self.laplacian) {
             let entry = lambda * entry;
             *sum = [entry, 0.0, 0.0, entry, 0.0, entry];
         }
-        let mut places = self.places.iter();
-        for (row, block) in blocks.iter().enumerate() {
-            let row = map.row(row);
+        let sums = &mut self.sums;
+        let mut add = |row: &[(u32, f64)], places: &mut std::slice::Iter<'_, u32>, block: &Block| {
             for (index, &(_, w)) in row.iter().enumerate() {
-                for (&(_, v), &place) in row[index..].iter().zip(&mut places) {
-                    let sum = &mut self.sums[place as usize];
-                    for (sum, entry) in sum.iter_mut().zip(block) {
+                for (&(_, v), &place) in row[index..].iter().zip(&mut *places) {
+                    for (sum, entry) in sums[place as usize].iter_mut().zip(block) {
                         *sum += w * v * entry;
                     }
                 }
+            }
+        };
+        let mut places = self.places.iter();
+        for (row, block) in blocks.iter().enumerate() {
+            add(map.row(row), &mut places, block);
+        }
+        if mu > 0.0 {
+            let mut places = self.bent_places.iter();
+            for (row, tangent) in tangents.iter().enumerate() {
+                let block = tangent.map_or([0.0; 6], |[x, y, z]| {
+                    [1.0 - x * x, -x * y, -x * z, 1.0 - y * y, -y * z, 1.0 - z * z].map(|entry| mu * entry)
+                });
+                add(self.bent.row(row), &mut places, &block);
             }
         }
         let count = map.columns();

@@ -28,6 +28,49 @@ pub struct Problem {
     pub notices: Vec<String>,
 }
 
+/// Centre and diagonal of the target's box.
+#[derive(Clone, Copy, Debug)]
+struct Units {
+    centre: [f64; 3],
+    diagonal: f64,
+}
+
+impl Units {
+    /// # Errors
+    /// A target without points or without size.
+    fn of(target: &TriangleMesh) -> Result<Units, Failure> {
+        let Some([low, high]) = mesh::bounding_box(&target.points) else {
+            return Err(invalid("target: there are no points".to_string()));
+        };
+        let extents: [f64; 3] = std::array::from_fn(|axis| high[axis] - low[axis]);
+        let longest = extents.into_iter().fold(0.0, f64::max);
+        // In units of the longest extent, whose square may underflow.
+        let diagonal = longest * extents.iter().map(|x| (x / longest).powi(2)).sum::<f64>().sqrt();
+        if !(diagonal > 0.0 && diagonal.is_finite()) {
+            return Err(invalid(format!(
+                "target: {} points in a box with the diagonal {}; give points that lie apart and within range",
+                target.points.len(),
+                if longest > 0.0 { diagonal } else { 0.0 }
+            )));
+        }
+        Ok(Units {
+            centre: std::array::from_fn(|axis| 0.5 * low[axis] + 0.5 * high[axis]),
+            diagonal,
+        })
+    }
+
+    fn scale(self, points: &mut [[f64; 3]]) {
+        for point in points {
+            *point = std::array::from_fn(|axis| (point[axis] - self.centre[axis]) / self.diagonal);
+        }
+    }
+
+    fn scaled(self, mut target: TriangleMesh) -> TriangleMesh {
+        self.scale(&mut target.points);
+        target
+    }
+}
+
 fn invalid(reason: String) -> Failure {
     Failure {
         kind: "invalid-input".to_string(),
@@ -64,6 +107,9 @@ impl Problem {
                 None => read(name, bytes, "target", &mut notices)?.triangulated(),
             },
         };
+        let units = Units::of(&target)?;
+        let target = units.scaled(target);
+        // A template is made on the scaled target, whose size no rounding and no underflow can spoil.
         let Some([low, high]) = mesh::bounding_box(&target.points) else {
             return Err(invalid("target: there are no points".to_string()));
         };
@@ -80,13 +126,14 @@ impl Problem {
                 parameters,
             } => {
                 let mut template = read(name, bytes, "template", &mut notices)?;
+                units.scale(&mut template.points);
                 if parameters.get("place").and_then(|place| place.as_str()) == Some("box") {
                     stretch(&mut template, [low, high])?;
                 }
                 template
             }
         };
-        let mut problem = Problem::from_parts(target, template, notices)?;
+        let mut problem = Problem::of_scaled(target, template, units, notices)?;
         if only_points {
             problem.use_points_alone();
         }
@@ -97,20 +144,24 @@ impl Problem {
     ///
     /// # Errors
     /// `invalid-input` when the target has no area, or the template no faces.
-    pub fn from_parts(
-        mut target: TriangleMesh,
-        mut template: Surface,
+    pub fn from_parts(target: TriangleMesh, mut template: Surface, notices: Vec<String>) -> Result<Problem, Failure> {
+        let units = Units::of(&target)?;
+        units.scale(&mut template.points);
+        Problem::of_scaled(units.scaled(target), template, units, notices)
+    }
+
+    fn of_scaled(
+        target: TriangleMesh,
+        template: Surface,
+        units: Units,
         mut notices: Vec<String>,
     ) -> Result<Problem, Failure> {
-        let diagonal = mesh::diagonal(&target.points);
-        let Some([low, high]) = mesh::bounding_box(&target.points) else {
-            return Err(invalid("target: there are no points".to_string()));
-        };
         let area = target.area();
+        let Units { centre, diagonal } = units;
         if target.cells.is_empty() {
-            if target.points.len() < 4 || !(diagonal > 0.0 && diagonal.is_finite()) {
+            if target.points.len() < 4 {
                 return Err(invalid(format!(
-                    "target: {} points in a box of diagonal {diagonal:e} are no cloud to fit; give more points, or a surface",
+                    "target: {} points are no cloud to fit; give more points, or a surface",
                     target.points.len()
                 )));
             }
@@ -118,9 +169,9 @@ impl Problem {
                 "target: a cloud of {} points without normals; the anisotropy has no effect",
                 target.points.len()
             ));
-        } else if !(area > 1e-14 * diagonal * diagonal && diagonal.is_finite()) {
+        } else if !(area > 1e-14) {
             return Err(invalid(format!(
-                "target: {} triangles have the area {area:e} in a box of diagonal {diagonal:e}; give a surface with area",
+                "target: {} triangles have {area:e} of the squared diagonal as their area; give a surface with area",
                 target.cells.len()
             )));
         }
@@ -133,10 +184,6 @@ impl Problem {
                 "target: {flat} of {} triangles have no area; they take no part in the fit and count in the distances",
                 target.cells.len()
             ));
-        }
-        let centre: [f64; 3] = std::array::from_fn(|axis| 0.5 * (low[axis] + high[axis]));
-        for point in target.points.iter_mut().chain(&mut template.points) {
-            *point = std::array::from_fn(|axis| (point[axis] - centre[axis]) / diagonal);
         }
         let cloud = target.cells.is_empty().then(|| target.points.clone());
         Ok(Problem {

@@ -60,6 +60,14 @@ pub static FIELDS: &[Field] = &[
               before. Preset best: [0.02, 0.002, 0.002, 0.0002], paper: 0.0002.",
     },
     Field {
+        name: "evenness",
+        kind: Kind::OneOf(&[NUMBERS, Kind::List(&NUMBERS)]),
+        default: Default::Absent,
+        doc: "Factor mu of |P L X|^2 with the projection P along the fit, whose normals are those at the start of the stage: \
+              spreads vertices evenly and keeps faces from folding without drawing the fit off the target. A number, or a \
+              list with one entry a stage. Preset best: [0, 0, 0.005], paper: 0.",
+    },
+    Field {
         name: "gradient",
         kind: Kind::Choice(&[
             ("complete", "the derivative of the value"),
@@ -127,7 +135,7 @@ pub static FIELDS: &[Field] = &[
             max: 10_000_000,
         },
         default: Default::Integer(0),
-        doc: "Points of a tessellation; 0 for twice as many as the fitted mesh has vertices.",
+        doc: "Points of a tessellation; 0 for as many as the fitted mesh has vertices.",
     },
     Field {
         name: "sampling_iterations",
@@ -234,9 +242,10 @@ pub enum Preconditioning {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Settings {
     pub terms: Terms,
-    /// One entry a stage, as are `regularization` and `change_tolerance`.
+    /// One entry a stage, as are `regularization`, `evenness` and `change_tolerance`.
     pub anisotropy: Vec<f64>,
     pub regularization: Vec<f64>,
+    pub evenness: Vec<f64>,
     pub gradient: Gradient,
     pub compatibility: f64,
     pub subdivisions: usize,
@@ -260,15 +269,18 @@ pub struct Settings {
 pub struct Stage {
     pub anisotropy: f64,
     pub regularization: f64,
+    pub evenness: f64,
     pub change_tolerance: f64,
 }
 
 /// The schedule of the preset `best`: a stiff mesh is drawn near first, then let loose.
 const ANISOTROPY: [f64; 4] = [1.0, 1.0, 10.0, 50.0];
 const REGULARIZATION: [f64; 4] = [2e-2, 2e-3, 2e-3, 2e-4];
+/// The plain distance hardly folds; the stretched one slides vertices along the target to gain a little distance.
+const EVENNESS: [f64; 3] = [0.0, 0.0, 5e-3];
 
 /// The settings that may have one entry a stage.
-const SCHEDULES: [&str; 3] = ["anisotropy", "regularization", "change_tolerance"];
+const SCHEDULES: [&str; 4] = ["anisotropy", "regularization", "evenness", "change_tolerance"];
 
 impl Settings {
     /// Reads validated settings, full or canonical. Fields that are absent take the preset's or the declared value.
@@ -312,6 +324,7 @@ impl Settings {
             Value::from(&REGULARIZATION[..]),
             Value::from(vec![2e-4]),
         );
+        preset("evenness", Value::from(&EVENNESS[..]), Value::from(vec![0.0]));
         preset(
             "change_tolerance",
             Value::from(vec![1e-3, 3e-4, 1e-3, 3e-4]),
@@ -357,6 +370,7 @@ impl Settings {
             .map(|stage| Stage {
                 anisotropy: entry(&self.anisotropy, stage),
                 regularization: entry(&self.regularization, stage),
+                evenness: entry(&self.evenness, stage),
                 change_tolerance: tolerance(stage),
             })
             .collect()
@@ -372,6 +386,7 @@ impl Settings {
         let column = |value: fn(&Stage) -> f64| Value::from(stages.iter().map(value).collect::<Vec<f64>>());
         table.insert("anisotropy".to_string(), column(|stage| stage.anisotropy));
         table.insert("regularization".to_string(), column(|stage| stage.regularization));
+        table.insert("evenness".to_string(), column(|stage| stage.evenness));
         table.insert("change_tolerance".to_string(), column(|stage| stage.change_tolerance));
         if self.subdivisions == 0 {
             table.insert("limit".to_string(), Value::from(false));
@@ -392,6 +407,7 @@ fn empty_list(settings: &Settings) -> Option<&'static str> {
     let lists = [
         &settings.anisotropy,
         &settings.regularization,
+        &settings.evenness,
         &settings.change_tolerance,
     ];
     SCHEDULES

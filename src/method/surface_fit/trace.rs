@@ -12,11 +12,15 @@ pub const COLUMNS: &[(&str, &str)] = &[
     ("stage", "number of the stage, from 0; refinements go on counting"),
     (
         "energy",
-        "what is minimized: both terms and the regularizer with its factor",
+        "what is minimized: both terms and the regularizers with their factors",
     ),
     ("target_to_fit", "the term from the target to the fit's vertices"),
     ("fit_to_target", "the term from the fit to the target's samples"),
     ("regularizer", "|L X|^2 without its factor"),
+    (
+        "unevenness",
+        "|P L X|^2, the part of it along the fit, without its factor",
+    ),
     (
         "gradient_norm",
         "Euclidean norm of the gradient over the control points",
@@ -27,7 +31,7 @@ pub const COLUMNS: &[(&str, &str)] = &[
 /// The rows so far.
 #[derive(Debug, Default)]
 pub struct Trace {
-    rows: Vec<[f64; 8]>,
+    rows: Vec<[f64; 9]>,
 }
 
 impl Trace {
@@ -69,6 +73,7 @@ impl Observer for Recorder<'_> {
             parts.from_target,
             parts.to_target,
             parts.regularizer,
+            parts.unevenness,
             iterate.gradient_norm,
             iterate.step,
         ]);

@@ -3,11 +3,14 @@
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use vargeo::fem::basis;
-use vargeo::fem::batches::unit_reference;
+use vargeo::fem::batches::{Batches, unit_reference};
 use vargeo::fem::boundary::Boundary;
 use vargeo::fem::certificate::{Certifier, Verdict};
 use vargeo::fem::coefficient_file;
+use vargeo::fem::quadrature::{CellQuadrature, Line, Rule, Scattered};
 use vargeo::fem::space::Space;
+use vargeo::linalg::processor::Processor;
+use vargeo::linalg::vector3::{Columns, cofactor, dot};
 use vargeo::mesh::TriangleMesh;
 use vargeo::mesh::mixed::{MixedMesh, Shape};
 use vargeo::mesh::template::{carve, collapse, extrude, grid, pillow, voxels};
@@ -276,7 +279,7 @@ fn certificates_agree_with_stored_verdicts() {
                 assert!(value <= 0.0);
                 seen[1] += 1;
             }
-            Verdict::Undecided => panic!("undecided, stored: {}", record["verdict"]),
+            Verdict::Undecided(_) => panic!("undecided, stored: {}", record["verdict"]),
         }
     }
     assert!(seen[0] > 2 && seen[1] > 1, "{seen:?}");
@@ -284,38 +287,83 @@ fn certificates_agree_with_stored_verdicts() {
 
 #[test]
 fn certificates_of_prisms_and_tetrahedra_hold_and_find_failures() {
-    let basis = basis::find("integrated-legendre").unwrap();
-    for shape in [Shape::Prism, Shape::Tetrahedron] {
-        let mut mesh = MixedMesh {
-            points: shape.canonical().to_vec(),
-            ..MixedMesh::default()
-        };
-        mesh.push(shape, &(0..shape.corners() as u32).collect::<Vec<_>>());
-        let topology = mesh.topology().unwrap();
-        let space = Space::new(&mesh, &topology, basis, &[3]).unwrap();
-        let certifier = Certifier::new(basis, space.cells.iter().map(|cell| cell.kind), 4000);
-        for (size, positive) in [(0.0, true), (0.05, true), (1.5, false)] {
-            let mut x = space.linear(&mesh.points);
-            for (place, value) in x.iter_mut().enumerate().skip(3 * space.vertices) {
-                *value = size * (1.3 * place as f64).sin();
-            }
-            let verdict = certifier.judge(&space, 0, &unit_reference(shape), &x);
-            assert_eq!(
-                matches!(verdict, Verdict::Positive(_)),
-                positive,
-                "{shape:?} {size}: {verdict:?}"
-            );
-            assert_eq!(matches!(verdict, Verdict::Negative(..)), !positive);
-            if size == 0.0 {
-                let Verdict::Positive(bound) = verdict else {
-                    unreachable!()
-                };
-                let exact =
-                    shape.canonical_volume() / vargeo::fem::batches::reference_volume(shape, &unit_reference(shape));
-                assert!((bound - exact).abs() < 1e-9, "{bound} {exact}");
+    for basis in basis::bases() {
+        for shape in Shape::ALL {
+            let mut mesh = MixedMesh {
+                points: shape.canonical().to_vec(),
+                ..MixedMesh::default()
+            };
+            mesh.push(shape, &(0..shape.corners() as u32).collect::<Vec<_>>());
+            let topology = mesh.topology().unwrap();
+            let space = Space::new(&mesh, &topology, *basis, &[4]).unwrap();
+            let certifier = Certifier::new(*basis, space.cells.iter().map(|cell| cell.kind), 20_000);
+            let reference = unit_reference(shape);
+            let lattice = Rule::Trapezoid.cell(shape, 12);
+            for size in [0.0, 0.02, 0.05, 1.0] {
+                let mut x = space.linear(&mesh.points);
+                for (place, value) in x.iter_mut().enumerate().skip(3 * space.vertices) {
+                    *value = size * (1.3 * place as f64).sin() / (1.0 + (place as f64 / 12.0));
+                }
+                let determinants = determinants(&space, &reference, &x, lattice.clone());
+                let least = determinants.into_iter().fold(f64::INFINITY, f64::min);
+                let name = format!("{} {shape:?} {size}", basis.name());
+                match certifier.judge(&space, 0, &reference, &x) {
+                    Verdict::Positive(bound) => {
+                        assert!(bound > 0.0 && bound <= least + 1e-9, "{name}: {bound} {least}");
+                        if size == 0.0 {
+                            assert!((bound - least).abs() < 1e-3, "{name}: {bound} {least}");
+                        }
+                    }
+                    Verdict::Negative(point, value) => {
+                        let there = determinant_at(&space, &reference, &x, point);
+                        assert!((there - value).abs() < 1e-9 && there <= 0.0, "{name}: {there} {value}");
+                        assert!(size > 0.05, "{name}");
+                    }
+                    Verdict::Undecided(bound) => panic!("{name}: undecided, at least {bound}, sampled {least}"),
+                }
+                if size == 1.0 {
+                    assert!(least < 0.0, "{name}");
+                }
             }
         }
     }
+}
+
+/// Determinants of the only cell of a space at the points of a quadrature.
+fn determinants(space: &Space, reference: &Columns<f64>, x: &[f64], quadrature: CellQuadrature) -> Vec<f64> {
+    let batches = Batches::new(space, &[*reference], &|_| quadrature.clone()).unwrap();
+    let mut result = Vec::new();
+    batches.visit(Processor::detect(), (0, 0), x, |_, _, jacobian| {
+        result.push(dot(jacobian[0], cofactor(&jacobian)[0]));
+    });
+    result
+}
+
+/// The determinant of the only cell of a space at one point.
+fn determinant_at(space: &Space, reference: &Columns<f64>, x: &[f64], [u, v, w]: [f64; 3]) -> f64 {
+    let line = |points: &[f64]| Line {
+        points: points.to_vec(),
+        weights: vec![1.0; points.len()],
+    };
+    let (quadrature, place) = match space.cells[0].kind.shape {
+        // Of the 27 points the one with the coordinates in their order.
+        Shape::Hexahedron => (CellQuadrature::Hexahedron(line(&[u, v, w])), 5),
+        Shape::Prism => {
+            let triangle = Scattered {
+                points: vec![[u, v]],
+                weights: vec![1.0],
+            };
+            (CellQuadrature::Prism(triangle, line(&[w])), 0)
+        }
+        Shape::Tetrahedron => {
+            let point = Scattered {
+                points: vec![[u, v, w]],
+                weights: vec![1.0],
+            };
+            (CellQuadrature::Tetrahedron(point), 0)
+        }
+    };
+    determinants(space, reference, x, quadrature)[place]
 }
 
 #[test]

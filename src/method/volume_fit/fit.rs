@@ -102,8 +102,8 @@ impl<'a> Fit<'a> {
                 "the template has the volume {own_volume:e}; its elements are inside out or flat"
             )));
         }
-        check_target(&target, &template_surface, &mut notices)?;
-        let scale = Scale::of(&target, &template_surface, own_volume);
+        let closed = check_target(&target, &template_surface, own_volume, &mut notices)?;
+        let scale = Scale::of(&target, closed, &template_surface, own_volume);
         let (references, whole) = match &shell {
             None => {
                 let shapes = volume.iter().map(|cell| cell.0);
@@ -308,45 +308,79 @@ pub(super) fn interrupted(stop: StopReason) -> bool {
     )
 }
 
-/// Names what is wrong with a target surface; an inside-out one is turned, an open or damaged one only mentioned.
-fn check_target(target: &Target, template: &TriangleMesh, notices: &mut Vec<String>) -> Result<(), Failure> {
+/// Names what is wrong with a target surface, and says whether it encloses a volume. An inside-out one does.
+fn check_target(
+    target: &Target,
+    template: &TriangleMesh,
+    template_volume: f64,
+    notices: &mut Vec<String>,
+) -> Result<bool, Failure> {
     if target.surface.cells.is_empty() {
         notices.push(format!(
-            "the target is a cloud of {} points without normals",
+            "the target is a cloud of {} points without normals: only the term from the template to the points is there",
             target.sites.len()
         ));
-        return Ok(());
+        return Ok(false);
     }
     if target.sites.is_empty() {
         return Err(invalid("every triangle of the target has no area".to_string()));
     }
+    // Vertices at one place are one: a soup of triangles may well be closed. Adding 0 makes -0 the same as 0.
+    let mut named: BTreeMap<[u64; 3], u32> = BTreeMap::new();
+    let names: Vec<u32> = target
+        .surface
+        .points
+        .iter()
+        .map(|point| {
+            let count = named.len() as u32;
+            *named
+                .entry(point.map(|coordinate| (coordinate + 0.0).to_bits()))
+                .or_insert(count)
+        })
+        .collect();
+    let joined = TriangleMesh {
+        points: Vec::new(),
+        cells: target
+            .surface
+            .cells
+            .iter()
+            .map(|cell| cell.map(|corner| names[corner as usize]))
+            .filter(|[a, b, c]| a != b && b != c && c != a)
+            .collect(),
+    };
     let mut sides = BTreeMap::<[u32; 2], [usize; 2]>::new();
-    for cell in &target.surface.cells {
+    for cell in &joined.cells {
         for place in 0..3 {
             let (a, b) = (cell[place], cell[(place + 1) % 3]);
             sides.entry([a.min(b), a.max(b)]).or_default()[usize::from(a > b)] += 1;
         }
     }
     let open = sides.values().filter(|count| count[0] + count[1] == 1).count();
-    if open > 0 {
+    let turned = sides
+        .values()
+        .filter(|count| count[0] + count[1] > 1 && count[0] != count[1])
+        .count();
+    let volume = target.surface.enclosed_volume();
+    if open + turned > 0 {
         notices.push(format!(
-            "the target is open or a soup: {open} of its {} edges have one triangle; volume and length scale are the \
-             template's where its own make no sense",
+            "the target does not enclose a volume: of its {} edges {open} have one triangle and {turned} have triangles of \
+             opposite orientations; the length scale is the template's volume {template_volume:.4}, not {volume:.4}, in units of \
+             the box's diagonal",
             sides.len()
         ));
-    } else {
-        if target.surface.enclosed_volume() < 0.0 {
-            notices.push("the target is inside out; distances do not depend on it".to_string());
-        }
-        let [wanted, given] = [&target.surface, template].map(euler_characteristic);
-        if wanted != given {
-            notices.push(format!(
-                "the template's boundary has the Euler characteristic {given}, the target {wanted}: as they differ in holes or \
-                 pieces, no fit is one-to-one; carve the template accordingly"
-            ));
-        }
+        return Ok(false);
     }
-    Ok(())
+    if volume < 0.0 {
+        notices.push("the target is inside out; distances do not depend on it".to_string());
+    }
+    let [wanted, given] = [&joined, template].map(euler_characteristic);
+    if wanted != given {
+        notices.push(format!(
+            "the template's boundary has the Euler characteristic {given}, the target {wanted}: as they differ in holes or \
+             pieces, no fit is one-to-one; carve the template accordingly"
+        ));
+    }
+    Ok(true)
 }
 
 /// Vertices less edges plus triangles, without points that no triangle uses.

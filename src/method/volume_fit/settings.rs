@@ -117,13 +117,26 @@ pub static FIELDS: &[Field] = &[
         name: "adaptive",
         kind: Kind::Boolean,
         default: Default::Boolean(false),
-        doc: "Raise the order of single elements where the energy would fall most, instead of all alike, up to `order`.",
+        doc: "Raise the order of single elements where it is needed most, instead of all alike, up to `order`.",
+    },
+    Field {
+        name: "adaptive_indicator",
+        kind: Kind::Choice(&[
+            ("distance", "where an element's boundary is farthest from the target"),
+            (
+                "energy",
+                "where the energy promises to fall most (its gradient by functions that are not there yet)",
+            ),
+        ]),
+        default: Default::Text("distance"),
+        doc: "Which elements are raised.",
     },
     Field {
         name: "adaptive_share",
         kind: Kind::Number { min: 0.01, max: 1.0 },
         default: Default::Number(0.5),
-        doc: "Share of the indicator that the elements chosen in a step must have together (Doerfler).",
+        doc: "By energy, the share of the indicator that the elements chosen in a step must have together (Doerfler); by \
+              distance, those are chosen whose distance is at least the largest less this share.",
     },
     Field {
         name: "adaptive_steps",
@@ -317,9 +330,17 @@ pub struct Settings {
     pub files: Option<Vec<String>>,
 }
 
+/// What chooses the elements whose orders are raised.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Indicator {
+    Distance,
+    Energy,
+}
+
 /// Raising single orders.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Adaptive {
+    pub indicator: Indicator,
     pub share: f64,
     pub steps: usize,
     pub most: usize,
@@ -463,6 +484,11 @@ impl Settings {
         };
         Ok(Settings {
             adaptive: flag("adaptive").then(|| Adaptive {
+                indicator: if text("adaptive_indicator") == "energy" {
+                    Indicator::Energy
+                } else {
+                    Indicator::Distance
+                },
                 share: number("adaptive_share"),
                 steps: number("adaptive_steps") as usize,
                 most: order,

@@ -68,8 +68,10 @@ pub fn read(part: &Part) -> Result<Target, Failure> {
                     let content = format::read(name, bytes).map_err(|error| invalid(error.to_string()))?;
                     notices.extend(content.notices.iter().map(|notice| format!("target: {notice}")));
                     let surface = triangles(&content);
-                    if surface.cells.is_empty() && !(content.tetrahedra.is_empty() && content.hexahedra.is_empty()) {
-                        let (volume, _) = MixedMesh::from_content(&content).map_err(invalid)?;
+                    let solids = content.tetrahedra.len() + content.hexahedra.len() + content.prisms.len();
+                    if surface.cells.is_empty() && solids > 0 {
+                        let (volume, found) = MixedMesh::from_content(&content).map_err(invalid)?;
+                        notices.extend(found.into_iter().map(|notice| format!("target: {notice}")));
                         let topology = volume.topology().map_err(invalid)?;
                         topology.boundary_triangles(&volume.points)
                     } else {
@@ -85,6 +87,16 @@ pub fn read(part: &Part) -> Result<Target, Failure> {
     };
     if clean.points.is_empty() {
         return Err(invalid("the target has neither triangles nor points".to_string()));
+    }
+    if let Some(place) = clean
+        .points
+        .iter()
+        .position(|point| !point.iter().all(|coordinate| coordinate.is_finite()))
+    {
+        return Err(invalid(format!(
+            "vertex {place} of the target is at {:?}; coordinates must be finite numbers",
+            clean.points[place]
+        )));
     }
     let mut target = Target {
         surface: damaged(&clean, parameters),

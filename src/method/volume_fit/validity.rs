@@ -37,6 +37,7 @@ pub fn certify(space: &Space, references: &[Columns<f64>], x: &[f64], observer: 
         notices: Vec::new(),
     };
     let mut first: Option<(usize, [f64; 3], f64)> = None;
+    let mut open: Option<f64> = None;
     while result.verdicts.len() < cells {
         if observer.stop().is_some() {
             result.verdicts.resize(cells, Judged::Undecided);
@@ -60,9 +61,18 @@ pub fn certify(space: &Space, references: &[Columns<f64>], x: &[f64], observer: 
                     first.get_or_insert((start + offset, point, value));
                     Judged::Fails
                 }
-                Verdict::Undecided => Judged::Undecided,
+                Verdict::Undecided(bound) => {
+                    open = Some(open.map_or(bound, |other: f64| other.min(bound)));
+                    Judged::Undecided
+                }
             });
         }
+    }
+    if let Some(bound) = open {
+        result.notices.push(format!(
+            "elements stay undecided after {MOST_PARTS} parts: no point of theirs with a determinant below 0 was found, and a \
+             proof only that it is at least {bound:.3e}"
+        ));
     }
     if let Some((cell, point, value)) = first {
         let count = result

@@ -2,10 +2,13 @@
 
 use super::{Certifier, NEGATIVE, Verdict, apply_right, determinant};
 use crate::fem::functions::line_table;
+use crate::fem::space::Kind;
 use crate::linalg::vector3::{Columns, add, dot, times};
 
 impl Certifier {
-    pub(super) fn hexahedron(&self, order: usize, coefficients: &[[f64; 3]], inverse: &Columns<f64>) -> Verdict {
+    pub(super) fn hexahedron(&self, kind: Kind, coefficients: &[[f64; 3]], inverse: &Columns<f64>) -> Verdict {
+        let order = kind.order;
+        let most = self.most(kind);
         let n = order + 1;
         let mut stack = vec![([0_u32; 3], 0_u32, f64::NEG_INFINITY)];
         let (mut parts, mut bound) = (0, f64::INFINITY);
@@ -99,7 +102,7 @@ impl Certifier {
                             }
                         }
                     }
-                    if parts + stack.len() + 8 > self.most || level > 20 {
+                    if parts + stack.len() + 8 > most || level > 20 {
                         let open = stack.iter().map(|part| part.2);
                         return Verdict::Undecided(open.fold(rough, f64::min));
                     }

@@ -62,6 +62,9 @@ fn rounding(norm: f64) -> f64 {
     1e-15 * norm
 }
 
+/// Products of a coefficient and a function that the proof for one cell may take.
+const MOST_WORK: usize = 2_000_000_000;
+
 /// Points below which a determinant counts as negative, relative to the reference.
 const NEGATIVE: f64 = -1e-12;
 
@@ -114,6 +117,17 @@ impl Certifier {
         (1..order).all(|j| self.basis.frequency(j).unwrap_or(0.0) == 0.0)
     }
 
+    /// Parts that a cell of this kind may be cut into.
+    fn most(&self, kind: Kind) -> usize {
+        let (n, m) = (kind.order + 1, self.degree(kind.order) + 1);
+        let work = match kind.shape {
+            Shape::Hexahedron => 9 * m * m * m * n,
+            Shape::Prism => (m * (m + 1) / 2) * (n * (n + 1) / 2 * n + 2 * n * m + m * m * (m + 1) / 2),
+            Shape::Tetrahedron => (m * (m + 1) * (m + 2) / 6) * (m * (m + 1) * (m + 2) / 6 + kind.functions()),
+        };
+        self.most.min(MOST_WORK / work).max(64)
+    }
+
     /// Degree of the polynomials that stand for the functions.
     fn degree(&self, order: usize) -> usize {
         if self.polynomial(order) {
@@ -140,9 +154,9 @@ impl Certifier {
         // Columns of A^-1: entry (row, column) is cof[row][column] / det.
         let inverse: Columns<f64> = [0, 1, 2].map(|column| [0, 1, 2].map(|row| cof[row][column] / determinant));
         let verdict = match slots.kind.shape {
-            Shape::Hexahedron => self.hexahedron(slots.kind.order, &coefficients, &inverse),
+            Shape::Hexahedron => self.hexahedron(slots.kind, &coefficients, &inverse),
             Shape::Prism => self.prism(slots.kind, &coefficients, &inverse),
-            Shape::Tetrahedron => self.tetrahedron(slots.kind.order, &coefficients, &inverse),
+            Shape::Tetrahedron => self.tetrahedron(slots.kind, &coefficients, &inverse),
         };
         match verdict {
             // The point in the cell's own coordinates.

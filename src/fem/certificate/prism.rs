@@ -10,6 +10,7 @@ use crate::linalg::vector3::{Columns, add, dot, times};
 impl Certifier {
     pub(super) fn prism(&self, kind: Kind, coefficients: &[[f64; 3]], inverse: &Columns<f64>) -> Verdict {
         let order = kind.order;
+        let most = self.most(kind);
         let degree = self.degree(order);
         let exact = self.polynomial(order);
         let (line_points, line_convert) = &self.lines[&degree];
@@ -122,7 +123,7 @@ impl Certifier {
             }
             match self.part(&mut control, error, inverse) {
                 Ok(least) => bound = bound.min(least),
-                Err(rough) if parts + stack.len() + 8 > self.most || level > 20 => {
+                Err(rough) if parts + stack.len() + 8 > most || level > 20 => {
                     let open = stack.iter().map(|part| part.3);
                     return Verdict::Undecided(open.fold(rough, f64::min));
                 }

@@ -4,10 +4,13 @@ use super::bernstein::{in_tetrahedron, tetrahedron_children};
 use super::chebyshev::tetrahedron_errors;
 use super::{Certifier, NEGATIVE, Verdict, accumulate, apply_right, determinant, frobenius, rounding};
 use crate::fem::functions::tetrahedron_table;
+use crate::fem::space::Kind;
 use crate::linalg::vector3::{Columns, add, dot, times};
 
 impl Certifier {
-    pub(super) fn tetrahedron(&self, order: usize, coefficients: &[[f64; 3]], inverse: &Columns<f64>) -> Verdict {
+    pub(super) fn tetrahedron(&self, kind: Kind, coefficients: &[[f64; 3]], inverse: &Columns<f64>) -> Verdict {
+        let order = kind.order;
+        let most = self.most(kind);
         let degree = self.degree(order);
         let exact = self.polynomial(order);
         let conversion = &self.tetrahedra[&degree];
@@ -68,7 +71,7 @@ impl Certifier {
             }
             match self.part(&mut control, error, inverse) {
                 Ok(least) => bound = bound.min(least),
-                Err(rough) if parts + stack.len() + 8 > self.most || level > 20 => {
+                Err(rough) if parts + stack.len() + 8 > most || level > 20 => {
                     let open = stack.iter().map(|part| part.2);
                     return Verdict::Undecided(open.fold(rough, f64::min));
                 }

@@ -141,11 +141,13 @@ fn raised_by_energy(fit: &Fit<'_>, adaptive: &Adaptive) -> Result<Option<Vec<usi
         boundary: &boundary,
         samples: &samples,
         lambda: fit.lambda,
-        size: fit.size,
+        x: &x,
+        references: &fit.references,
         volume: fit.reference_volume,
         surface: factor,
         anisotropy: settings.anisotropy,
-    });
+    })
+    .map_err(invalid)?;
     let mut sharers = vec![0.0; space.nodes];
     for cell in &space.cells {
         for (node, _) in cell.slots.iter().filter_map(|slot| slot.node()) {

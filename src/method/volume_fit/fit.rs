@@ -4,11 +4,11 @@ use super::objective::Parts;
 use super::settings::{Settings, Stage};
 use super::shell::{self, Shell};
 use super::surface_energy::Scale;
-use super::target::Target;
+use super::target::{Closure, Target};
 use super::template::{Template, transform};
 use super::{COUNTERS, adaptivity, invalid, quality, subdivision, untangle, validity};
 use crate::energy::mapping::Density;
-use crate::fem::batches::{Batches, reference_volume, references_of_volume, unit_reference};
+use crate::fem::batches::{Batches, reference_volume, references_of_volume};
 use crate::fem::space::{Kind, Space};
 use crate::fem::volume_energy::VolumeEnergy;
 use crate::linalg::vector3::Columns;
@@ -27,8 +27,6 @@ pub(super) struct Fit<'a> {
     pub(super) shell: Option<Shell>,
     pub(super) references: Vec<Columns<f64>>,
     pub(super) reference_volume: f64,
-    /// Edge of the references.
-    pub(super) size: f64,
     pub(super) scale: Scale,
     /// The target's units: length of 1 here, and the middle.
     pub(super) unit: f64,
@@ -102,7 +100,7 @@ impl<'a> Fit<'a> {
                 "the template has the volume {own_volume:e}; its elements are inside out or flat"
             )));
         }
-        let closed = check_target(&target, &template_surface, own_volume, &mut notices)?;
+        let closed = check_target(&target, &template_surface, own_volume, shell.is_some(), &mut notices)?;
         let scale = Scale::of(&target, closed, &template_surface, own_volume);
         let (references, whole) = match &shell {
             None => {
@@ -117,10 +115,21 @@ impl<'a> Fit<'a> {
                 (shell.references.clone(), sum)
             }
         };
-        let unit_volume: f64 = volume
-            .iter()
-            .map(|(shape, _)| reference_volume(shape, &unit_reference(shape)))
-            .sum();
+        if settings.levels > 0 && (map.is_some() || shell.is_some()) {
+            return Err(invalid(
+                "a subdivision volume starts from straight hexahedra, not from a coefficient file or a shell; remove \
+                 `subdivision_levels`"
+                    .to_string(),
+            ));
+        }
+        if let Some(highest) = map.as_ref().and_then(|map| map.orders.iter().max())
+            && *highest > settings.order
+        {
+            notices.push(format!(
+                "the template's elements have orders up to {highest}, above the order {} of the job: they keep them",
+                settings.order
+            ));
+        }
         let first = settings.stages[0].order;
         let (space, x) = match map {
             None => {
@@ -144,7 +153,6 @@ impl<'a> Fit<'a> {
         };
         Ok(Fit {
             settings,
-            size: (whole / unit_volume).cbrt(),
             reference_volume: whole,
             shell,
             volume,
@@ -313,6 +321,7 @@ fn check_target(
     target: &Target,
     template: &TriangleMesh,
     template_volume: f64,
+    is_shell: bool,
     notices: &mut Vec<String>,
 ) -> Result<bool, Failure> {
     if target.surface.cells.is_empty() {
@@ -325,55 +334,25 @@ fn check_target(
     if target.sites.is_empty() {
         return Err(invalid("every triangle of the target has no area".to_string()));
     }
-    // Vertices at one place are one: a soup of triangles may well be closed. Adding 0 makes -0 the same as 0.
-    let mut named: BTreeMap<[u64; 3], u32> = BTreeMap::new();
-    let names: Vec<u32> = target
-        .surface
-        .points
-        .iter()
-        .map(|point| {
-            let count = named.len() as u32;
-            *named
-                .entry(point.map(|coordinate| (coordinate + 0.0).to_bits()))
-                .or_insert(count)
-        })
-        .collect();
-    let joined = TriangleMesh {
-        points: Vec::new(),
-        cells: target
-            .surface
-            .cells
-            .iter()
-            .map(|cell| cell.map(|corner| names[corner as usize]))
-            .filter(|[a, b, c]| a != b && b != c && c != a)
-            .collect(),
-    };
-    let mut sides = BTreeMap::<[u32; 2], [usize; 2]>::new();
-    for cell in &joined.cells {
-        for place in 0..3 {
-            let (a, b) = (cell[place], cell[(place + 1) % 3]);
-            sides.entry([a.min(b), a.max(b)]).or_default()[usize::from(a > b)] += 1;
-        }
-    }
-    let open = sides.values().filter(|count| count[0] + count[1] == 1).count();
-    let turned = sides
-        .values()
-        .filter(|count| count[0] + count[1] > 1 && count[0] != count[1])
-        .count();
+    let closure = Closure::of(&target.surface);
     let volume = target.surface.enclosed_volume();
-    if open + turned > 0 {
+    if !closure.is_closed() {
         notices.push(format!(
-            "the target does not enclose a volume: of its {} edges {open} have one triangle and {turned} have triangles of \
-             opposite orientations; the length scale is the template's volume {template_volume:.4}, not {volume:.4}, in units of \
-             the box's diagonal",
-            sides.len()
+            "the target does not enclose a volume: of its {} edges {} have one triangle and {} have triangles of opposite \
+             orientations; the length scale is from the template's volume {template_volume:.4}, not {volume:.4} (in units of \
+             the box's diagonal)",
+            closure.edges, closure.open, closure.turned
         ));
         return Ok(false);
+    }
+    // A shell has two surfaces, and is turned when it is grown.
+    if is_shell {
+        return Ok(true);
     }
     if volume < 0.0 {
         notices.push("the target is inside out; distances do not depend on it".to_string());
     }
-    let [wanted, given] = [&joined, template].map(euler_characteristic);
+    let [wanted, given] = [&closure.joined, template].map(euler_characteristic);
     if wanted != given {
         notices.push(format!(
             "the template's boundary has the Euler characteristic {given}, the target {wanted}: as they differ in holes or \

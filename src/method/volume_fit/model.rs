@@ -12,15 +12,16 @@ const COORDINATE: Kind = Kind::Number { min: -1e9, max: 1e9 };
 static OPERATION: &[Field] = &[
     Field {
         name: "op",
+        // First the one that needs no box.
         kind: Kind::Choice(&[
+            (
+                "pillow",
+                "put a layer of cells around the whole boundary, inside the old one",
+            ),
             ("carve", "remove the cells whose centroid lies in the box"),
             (
                 "extrude",
                 "put layers of cells on the boundary faces whose centroid lies in the box",
-            ),
-            (
-                "pillow",
-                "put a layer of cells around the whole boundary, inside the old one",
             ),
             (
                 "collapse",

@@ -289,6 +289,33 @@ pub static FIELDS: &[Field] = &[
     },
 ];
 
+/// What a shell does not read: it has no surface energy and one term.
+pub const WITHOUT_EFFECT_ON_SHELLS: &[&str] = &[
+    "lambda",
+    "lambda_far",
+    "adaptive",
+    "adaptive_indicator",
+    "adaptive_share",
+    "adaptive_steps",
+    "distance",
+    "anisotropy",
+    "surface_samples",
+    "repairs",
+    "crease_angle",
+];
+
+/// What a subdivision volume does not read.
+pub const WITHOUT_EFFECT_ON_SUBDIVISIONS: &[&str] = &[
+    "adaptive",
+    "adaptive_indicator",
+    "adaptive_share",
+    "adaptive_steps",
+    "repairs",
+    "raise",
+    "solver",
+    "refresh",
+];
+
 /// A stage.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stage {

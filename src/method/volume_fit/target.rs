@@ -7,6 +7,7 @@ use crate::mesh::{self, TriangleMesh};
 use crate::method::Failure;
 use crate::method::model::Part;
 use serde_json::Value;
+use std::collections::BTreeMap;
 
 /// What the boundary is fitted to, in the units of its file.
 #[derive(Clone, Debug, Default)]
@@ -149,6 +150,62 @@ fn cloud(name: &str, bytes: &[u8]) -> Result<Option<Vec<[f64; 3]>>, Failure> {
         }
     }
     Ok(Some(points))
+}
+
+/// Whether a surface encloses a volume, and what of it does not.
+#[derive(Clone, Debug)]
+pub struct Closure {
+    /// The triangles over vertices that are one where they are at one place; those with a vertex twice are left out.
+    pub joined: TriangleMesh,
+    pub edges: usize,
+    /// Edges with one triangle.
+    pub open: usize,
+    /// Edges with more that do not run through them as often one way as the other.
+    pub turned: usize,
+}
+
+impl Closure {
+    /// Looks at every edge; a soup of triangles may well be closed.
+    pub fn of(surface: &TriangleMesh) -> Closure {
+        let mut named: BTreeMap<[u64; 3], u32> = BTreeMap::new();
+        let names: Vec<u32> = surface
+            .points
+            .iter()
+            .map(|point| {
+                let count = named.len() as u32;
+                // Adding 0 makes -0 the same as 0.
+                *named
+                    .entry(point.map(|coordinate| (coordinate + 0.0).to_bits()))
+                    .or_insert(count)
+            })
+            .collect();
+        let cells = surface
+            .cells
+            .iter()
+            .map(|cell| cell.map(|corner| names[corner as usize]));
+        let joined = TriangleMesh {
+            points: Vec::new(),
+            cells: cells.filter(|[a, b, c]| a != b && b != c && c != a).collect(),
+        };
+        let mut sides = BTreeMap::<[u32; 2], [usize; 2]>::new();
+        for cell in &joined.cells {
+            for place in 0..3 {
+                let (a, b) = (cell[place], cell[(place + 1) % 3]);
+                sides.entry([a.min(b), a.max(b)]).or_default()[usize::from(a > b)] += 1;
+            }
+        }
+        let count = |wanted: &dyn Fn(&[usize; 2]) -> bool| sides.values().filter(|sides| wanted(sides)).count();
+        Closure {
+            edges: sides.len(),
+            open: count(&|sides| sides[0] + sides[1] == 1),
+            turned: count(&|sides| sides[0] + sides[1] > 1 && sides[0] != sides[1]),
+            joined,
+        }
+    }
+
+    pub fn is_closed(&self) -> bool {
+        self.edges > 0 && self.open + self.turned == 0
+    }
 }
 
 fn centroids(surface: &TriangleMesh) -> Vec<[f64; 3]> {

@@ -26,6 +26,9 @@ pub struct Certificates {
 /// Parts that an element is cut into at most.
 const MOST_PARTS: usize = 4000;
 
+/// Elements judged before the observer is asked again.
+const CHUNK: usize = 16;
+
 /// Proves that determinants are positive everywhere, element by element.
 pub fn certify(space: &Space, references: &[Columns<f64>], x: &[f64], observer: &dyn Observer) -> Certificates {
     let cells = space.cells.len();
@@ -47,7 +50,7 @@ pub fn certify(space: &Space, references: &[Columns<f64>], x: &[f64], observer: 
             break;
         }
         let start = result.verdicts.len();
-        let verdicts: Vec<Verdict> = (start..(start + 64).min(cells))
+        let verdicts: Vec<Verdict> = (start..(start + CHUNK).min(cells))
             .into_par_iter()
             .map(|cell| certifier.judge(space, cell, &references[cell], x))
             .collect();

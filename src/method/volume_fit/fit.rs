@@ -291,6 +291,7 @@ impl<'a> Fit<'a> {
                 self.certificates = Some(certificates);
                 break;
             }
+            observer.phase("repair");
             self.extra_points += 3;
             self.notices.push(format!(
                 "{failing} elements were invalid between quadrature points; gone on with {} more a direction",

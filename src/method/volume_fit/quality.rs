@@ -101,23 +101,27 @@ fn corner_frames(shape: Shape) -> Vec<Columns<f64>> {
     frames
 }
 
+/// The lower of two numbers, not-a-number if one is: a determinant that is none must not pass for a good one.
+fn lower(a: f64, b: f64) -> f64 {
+    if a.is_nan() || a < b { a } else { b }
+}
+
 /// Judges every element at many points.
 pub fn quality(space: &Space, references: &[Columns<f64>], x: &[f64]) -> Result<Quality, Failure> {
     let inside = figures(space, references, x, &|kind| even_points(kind.shape))?;
     let lattice = figures(space, references, x, &|kind| {
         Rule::Trapezoid.cell(kind.shape, SAMPLES + 1)
     })?;
-    let least = |a: f64, b: f64| if a < b { a } else { b };
     let mut result = Quality::default();
     let mut sums = [0.0; 3];
     for (inside, lattice) in inside.iter().zip(&lattice) {
         result.scaled_jacobian_mean.push(inside.scaled_jacobian / inside.points);
         result
             .scaled_jacobian_min
-            .push(least(inside.least_scaled_jacobian, lattice.least_scaled_jacobian));
+            .push(lower(inside.least_scaled_jacobian, lattice.least_scaled_jacobian));
         result
             .least_determinant
-            .push(least(inside.least_determinant, lattice.least_determinant));
+            .push(lower(inside.least_determinant, lattice.least_determinant));
         result
             .largest_determinant
             .push(inside.largest_determinant.max(lattice.largest_determinant));
@@ -178,13 +182,13 @@ fn figures(
                     let image = frame.map(|edge| apply(&jacobian, edge));
                     let product: f64 = image.iter().map(|edge| mesh::length(*edge)).product();
                     // The images' determinant over that of the frame is the map's own.
-                    least = least.min(determinant / product.max(f64::MIN_POSITIVE));
+                    least = lower(least, determinant / product.max(f64::MIN_POSITIVE));
                 }
                 let entry = sums.entry(cell).or_insert(none);
                 entry.points += 1.0;
                 entry.scaled_jacobian += least;
-                entry.least_scaled_jacobian = entry.least_scaled_jacobian.min(least);
-                entry.least_determinant = entry.least_determinant.min(determinant);
+                entry.least_scaled_jacobian = lower(entry.least_scaled_jacobian, least);
+                entry.least_determinant = lower(entry.least_determinant, determinant);
                 entry.largest_determinant = entry.largest_determinant.max(determinant);
                 if determinant > 0.0 {
                     let logarithm = determinant.ln();

@@ -99,7 +99,8 @@ pub static FIELDS: &[Field] = &[
         name: "lambda",
         kind: Kind::Number { min: 1e-9, max: 1e9 },
         default: Default::Number(0.05),
-        doc: "Weight of the volume energy in the close phase.",
+        doc: "Weight of the volume energy in the close phase. It costs distance: where orders no longer bring the boundary nearer, \
+              a smaller one does, or a finer target.",
     },
     Field {
         name: "far_steps",

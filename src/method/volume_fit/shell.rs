@@ -121,7 +121,7 @@ pub fn grow(surface: &TriangleMesh, distance: f64, layers: usize, side: &str) ->
 }
 
 /// The surface without points that no triangle uses.
-fn used(surface: &TriangleMesh) -> TriangleMesh {
+pub(super) fn used(surface: &TriangleMesh) -> TriangleMesh {
     let mut names = vec![u32::MAX; surface.points.len()];
     let mut result = TriangleMesh::default();
     for cell in &surface.cells {

@@ -1,6 +1,6 @@
 //! The target: a surface read from a file or generated, damaged on request, or a cloud of points.
 
-use super::shapes;
+use super::{shapes, shell};
 use crate::mesh::format::{self, Content};
 use crate::mesh::mixed::MixedMesh;
 use crate::mesh::{self, TriangleMesh};
@@ -82,6 +82,10 @@ pub fn read(part: &Part) -> Result<Target, Failure> {
             };
             for point in &mut surface.points {
                 *point = point.map(|coordinate| coordinate * scale);
+            }
+            if !surface.cells.is_empty() {
+                // A stray point far away would make the box, and with it the unit of length, meaningless.
+                surface = shell::used(&surface);
             }
             (surface, parameters)
         }

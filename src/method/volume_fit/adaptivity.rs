@@ -20,17 +20,25 @@ use crate::method::volume_fit::preconditioner::{Model, diagonal};
 use rayon::prelude::*;
 
 /// Orders with those raised that the indicator chooses; nothing when no order can be raised.
-pub(super) fn raised(fit: &Fit<'_>, adaptive: &Adaptive) -> Result<Option<Vec<usize>>, Failure> {
+/// `history` is what the steps before had to show.
+pub(super) fn raised(
+    fit: &Fit<'_>,
+    adaptive: &Adaptive,
+    history: &mut Vec<f64>,
+) -> Result<Option<Vec<usize>>, Failure> {
     match adaptive.indicator {
-        Indicator::Distance => Ok(raised_by_distance(fit, adaptive)),
+        Indicator::Distance => Ok(raised_by_distance(fit, adaptive, history)),
         Indicator::Energy => raised_by_energy(fit, adaptive),
     }
 }
 
 /// Intervals along an edge, at least, when distances are measured.
 const FINE: usize = 12;
+/// Raising is in vain when the largest distance is not below this share of what it was so many steps before.
+const WORTHWHILE: f64 = 0.97;
+const PATIENCE: usize = 3;
 
-fn raised_by_distance(fit: &Fit<'_>, adaptive: &Adaptive) -> Option<Vec<usize>> {
+fn raised_by_distance(fit: &Fit<'_>, adaptive: &Adaptive, history: &mut Vec<f64>) -> Option<Vec<usize>> {
     let orders = &fit.space.orders;
     let highest = orders.iter().copied().max().unwrap_or(1);
     let boundary = Boundary::new(&fit.volume, &fit.topology, &fit.space, FINE.max(2 * highest));
@@ -75,6 +83,14 @@ fn raised_by_distance(fit: &Fit<'_>, adaptive: &Adaptive) -> Option<Vec<usize>> 
         .zip(&far)
         .filter(|(order, _)| **order < adaptive.most)
         .fold(0.0_f64, |most, (_, &far)| most.max(far));
+    // What the volume energy holds back no order brings nearer.
+    let before = history.len().checked_sub(PATIENCE).map(|place| history[place]);
+    history.push(far.iter().copied().fold(0.0, f64::max));
+    if let (Some(before), Some(&now)) = (before, history.last())
+        && now > WORTHWHILE * before
+    {
+        return None;
+    }
     let chosen = |(&order, &far): (&usize, &f64)| {
         if order < adaptive.most && far > 0.0 && far >= (1.0 - adaptive.share) * most {
             order + 1

@@ -261,19 +261,26 @@ impl<'a> Fit<'a> {
         if let Some(adaptive) = self.settings.adaptive
             && !interrupted(stop)
         {
+            let last = self.settings.stages[self.settings.stages.len() - 1];
+            let mut history = Vec::new();
             for _ in 0..adaptive.steps {
-                let Some(orders) = adaptivity::raised(self, &adaptive)? else {
+                let Some(orders) = adaptivity::raised(self, &adaptive, &mut history)? else {
                     break;
                 };
                 self.raise(&orders)?;
                 let stage = Stage {
                     order: orders.iter().copied().max().unwrap_or(1),
-                    ..self.settings.stages[self.settings.stages.len() - 1]
+                    tolerance: self.settings.coarse_tolerance,
+                    ..last
                 };
                 (stop, reason) = self.stage(&stage, observer)?;
                 if interrupted(stop) {
                     break;
                 }
+            }
+            if !interrupted(stop) {
+                let order = self.space.orders.iter().copied().max().unwrap_or(1);
+                (stop, reason) = self.stage(&Stage { order, ..last }, observer)?;
             }
         }
         for _ in 0..self.settings.repairs {

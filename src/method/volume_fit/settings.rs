@@ -63,7 +63,10 @@ pub static FIELDS: &[Field] = &[
     Field {
         name: "preset",
         kind: Kind::Choice(&[
-            ("best", "integrated Legendre, Lobatto quadrature, preconditioned L-BFGS"),
+            (
+                "best",
+                "integrated Legendre, Lobatto quadrature, preconditioned L-BFGS, a far phase in steps",
+            ),
             (
                 "paper",
                 "integrated Fourier, trapezoid rule, plain L-BFGS until the gradient norm is 1e-8",
@@ -92,8 +95,8 @@ pub static FIELDS: &[Field] = &[
         name: "lambda_far",
         kind: Kind::Number { min: 0.0, max: 1e9 },
         default: Default::Absent,
-        doc: "Weight of the volume energy in the far phase; 0 leaves the far phase out. Preset best: 0, because a template in \
-              the target's box is near enough and a stiff phase bends thin layers; paper: 50.",
+        doc: "Weight of the volume energy in the far phase, which brings a template that is far away near as a whole, where the \
+              close phase would crush its outer layer; 0 leaves the far phase out. 50 when absent.",
     },
     Field {
         name: "lambda",
@@ -105,8 +108,8 @@ pub static FIELDS: &[Field] = &[
     Field {
         name: "far_steps",
         kind: Kind::Integer { min: 1, max: 50 },
-        default: Default::Integer(1),
-        doc: "Stages of the far phase: 1 keeps lambda_far; more go down to lambda in geometric steps.",
+        default: Default::Absent,
+        doc: "Stages of the far phase: 1 keeps lambda_far; more go down to lambda in geometric steps. Preset best: 3, paper: 1.",
     },
     Field {
         name: "schedule",
@@ -255,6 +258,13 @@ pub static FIELDS: &[Field] = &[
         doc: "A stage has converged when an iteration lowers the energy by less than this share. Preset best: 1e-5, paper: 0.",
     },
     Field {
+        name: "coarse_tolerance",
+        kind: Kind::Number { min: 0.0, max: 1.0 },
+        default: Default::Absent,
+        doc: "The same for all stages but the last, where larger: what a low order cannot follow is not forced, which would \
+              crush elements. Preset best: 1e-3, paper: 0.",
+    },
+    Field {
         name: "untangle",
         kind: Kind::Boolean,
         default: Default::Boolean(true),
@@ -323,6 +333,8 @@ pub struct Stage {
     pub lambda: f64,
     pub order: usize,
     pub iterations: u64,
+    /// Share of its change in an iteration below which the energy has converged.
+    pub tolerance: f64,
 }
 
 /// Which terms the surface energy has.
@@ -349,7 +361,8 @@ pub struct Settings {
     pub memory: usize,
     pub refresh: u64,
     pub gradient_tolerance: f64,
-    pub change_tolerance: f64,
+    /// Tolerance of stages before the last.
+    pub coarse_tolerance: f64,
     pub untangle: bool,
     pub repairs: usize,
     pub levels: usize,
@@ -438,9 +451,15 @@ impl Settings {
             })
         };
         let far = settings.get("lambda_far").and_then(Value::as_f64);
-        let far = far.unwrap_or(if paper { 50.0 } else { 0.0 });
+        let far = far.unwrap_or(50.0);
         let order = number("order") as usize;
         let limit = number("iteration_limit") as u64;
+        let given = |name: &str, best: f64| {
+            let value = settings.get(name).and_then(Value::as_f64);
+            value.unwrap_or(if paper { 0.0 } else { best })
+        };
+        let tolerance = given("change_tolerance", 1e-5);
+        let coarse_tolerance = tolerance.max(given("coarse_tolerance", 1e-3));
         let mut stages = Vec::new();
         match settings.get("schedule").and_then(Value::as_array) {
             Some(list) => {
@@ -454,6 +473,7 @@ impl Settings {
                         lambda,
                         order: order as usize,
                         iterations: stage.get("iterations").and_then(Value::as_u64).unwrap_or(limit),
+                        tolerance,
                     });
                 }
             }
@@ -463,11 +483,16 @@ impl Settings {
                     &text("raise"),
                     far,
                     number("lambda"),
-                    number("far_steps") as usize,
+                    whole("far_steps").unwrap_or(if paper { 1 } else { 3 }),
                     limit,
+                    tolerance,
                     flag("adaptive"),
                 )
             }
+        }
+        let last = stages.len().saturating_sub(1);
+        for stage in &mut stages[..last] {
+            stage.tolerance = coarse_tolerance;
         }
         if stages.is_empty() {
             return Err(invalid("the schedule has no stage; give at least one".to_string()));
@@ -537,10 +562,7 @@ impl Settings {
             memory: number("memory") as usize,
             refresh: number("refresh") as u64,
             gradient_tolerance: number("gradient_tolerance"),
-            change_tolerance: settings
-                .get("change_tolerance")
-                .and_then(Value::as_f64)
-                .unwrap_or(if paper { 0.0 } else { 1e-5 }),
+            coarse_tolerance,
             untangle: flag("untangle"),
             levels,
             crease_angle: number("crease_angle"),
@@ -571,6 +593,7 @@ fn default_schedule(
     close: f64,
     far_steps: usize,
     iterations: u64,
+    tolerance: f64,
     adaptive: bool,
 ) -> Vec<Stage> {
     let direct = raise == "direct";
@@ -583,6 +606,7 @@ fn default_schedule(
                 lambda: far.powf(1.0 - share) * close.powf(share),
                 order: first,
                 iterations,
+                tolerance,
             });
         }
     }
@@ -592,6 +616,7 @@ fn default_schedule(
             lambda: close,
             order: here,
             iterations,
+            tolerance,
         });
         if here >= order || adaptive {
             return stages;

@@ -187,7 +187,7 @@ impl Fit<'_> {
                 stopping: Stopping {
                     gradient_norm: settings.gradient_tolerance,
                     relative_decrement: 0.0,
-                    relative_change: settings.change_tolerance,
+                    relative_change: stage.tolerance,
                     iterations: round,
                     ..Stopping::default()
                 },
@@ -231,7 +231,7 @@ impl Fit<'_> {
                 solution.stop == StopReason::Converged && solution.gradient_norm >= settings.gradient_tolerance;
             let again = by_change
                 && solution.counters.iterations > 0
-                && settled - solution.value > 5.0 * settings.change_tolerance * solution.value.abs();
+                && settled - solution.value > 5.0 * stage.tolerance * solution.value.abs();
             if again {
                 settled = solution.value;
             }

@@ -8,7 +8,7 @@ use vargeo::fem::coefficient_file;
 use vargeo::fem::space::Space;
 use vargeo::mesh::TriangleMesh;
 use vargeo::mesh::format::Content;
-use vargeo::mesh::mixed::{MixedMesh, Shape};
+use vargeo::mesh::mixed::MixedMesh;
 use vargeo::mesh::template::{carve, collapse, extrude, grid, pillow, voxels};
 use vargeo::method::model::{LoadedModel, Part};
 use vargeo::method::volume_fit::VolumeFit;

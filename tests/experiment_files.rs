@@ -175,6 +175,47 @@ stop = "converged"
 }
 
 #[test]
+fn what_refines_tells_no_series_apart() {
+    let file = |rest: &str| {
+        format!("{HEAD}[vary]\nenergy = [\"arap\", \"stretch\"]\n\"model.tetrahedra\" = [100, 200, 400]\n{rest}")
+    };
+    let series = |rest: &str| good(&file(rest)).plots[0].series.clone();
+    // Towards a measured figure the models' numbers refine; settings of numbers do not by themselves.
+    assert_eq!(
+        series("order = [1, 2]\n[[plot]]\nx = \"h\"\ny = \"l2_error\"\n"),
+        ["energy", "order"]
+    );
+    // Towards an axis that axis alone.
+    let axis = "order = [1, 2]\n[[plot]]\nx = \"order\"\ny = \"l2_error\"\n";
+    assert_eq!(series(axis), ["energy", "model.tetrahedra"]);
+    // What is zipped with an axis that refines goes with it.
+    let zipped = good(&format!(
+        "{HEAD}[vary]\nenergy = [\"arap\", \"stretch\"]\n[[zip]]\n\"model.tetrahedra\" = [100, 200]\norder = [1, 2]\n\
+         [[plot]]\nx = \"h\"\ny = \"l2_error\"\n[[rate]]\nx = \"order\"\ny = \"l2_error\"\n"
+    ));
+    assert_eq!(zipped.plots[0].series, ["energy"]);
+    assert_eq!(zipped.rates[0].series, ["energy"]);
+}
+
+#[test]
+fn series_that_join_different_jobs_are_told() {
+    let told = |rest: &str| {
+        after_head(&format!(
+            "[vary]\nenergy = [\"arap\", \"stretch\"]\norder = [1, 2]\n\"model.tetrahedra\" = [100, 200]\n[[rate]]\n{rest}"
+        ))
+    };
+    // Numbers may refine towards a measured figure, words do not.
+    assert_eq!(
+        told("x = \"h\"\ny = \"l2_error\"\nseries = \"order\"\n"),
+        "8:10 each series joins jobs that differ in energy |  | add energy to \"series\", or say which jobs with \"where\""
+    );
+    assert_eq!(told("x = \"h\"\ny = \"l2_error\"\nseries = \"energy\"\n"), "");
+    let one = "x = \"h\"\ny = \"l2_error\"\nseries = \"order\"\nwhere = { energy = \"arap\" }\n";
+    assert_eq!(told(one), "");
+    assert!(told("x = \"order\"\ny = \"l2_error\"\nseries = \"energy\"\n").contains("differ in model.tetrahedra |"));
+}
+
+#[test]
 fn every_mistake_has_its_place_and_its_mend() {
     let cases: &[(&str, &str)] = &[
         (

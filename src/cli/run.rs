@@ -256,6 +256,32 @@ pub(super) fn rows(plan: &Plan, store: &Store, finished: Vec<Finished>) -> Vec<R
     finished.into_iter().map(row).collect()
 }
 
+/// In a report's folder, the path of the experiment file it was written for.
+const ORIGIN: &str = ".origin";
+
+/// Warns where a folder holds the report of another experiment file of the same name, and notes whose it is from now on.
+fn tell_overwritten(experiment: &Experiment, folder: &Path) {
+    let file = experiment.origin.folder.join(format!("{}.toml", experiment.name));
+    let Ok(file) = std::fs::canonicalize(file) else {
+        return;
+    };
+    let note = folder.join(ORIGIN);
+    let before = std::fs::read_to_string(&note).map(PathBuf::from);
+    if let Ok(before) = before
+        && before != file
+        && before.exists()
+    {
+        eprintln!(
+            "warning: {} held the report of {}, which is overwritten; its results stay in the store\nhelp: rename one of \
+             the two files, or give each a --results folder of its own",
+            folder.display(),
+            before.display()
+        );
+    }
+    // Without the note the next warning is missing, nothing else.
+    let _ = std::fs::create_dir_all(folder).and_then(|()| std::fs::write(&note, file.as_os_str().as_encoded_bytes()));
+}
+
 /// Writes `results/<experiment>/` and prints the tables.
 pub(super) fn write_report(
     experiment: &Experiment,
@@ -265,6 +291,7 @@ pub(super) fn write_report(
     quiet: bool,
 ) -> Result<report::Written, Exit> {
     let folder = results.join(&experiment.name);
+    tell_overwritten(experiment, &folder);
     let written = report::write(experiment, rows, planned, &folder).map_err(|error| wrong(&error.to_string()))?;
     if !quiet {
         say(&report::terminal(experiment, rows, None));

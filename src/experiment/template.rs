@@ -9,7 +9,8 @@ use super::document::quote;
 use super::section::{LIMITS, TIMING};
 use crate::method::Method;
 use crate::method::model::Role;
-use crate::method::setting::{Default, Field, Kind};
+use crate::method::setting::{Default, Field, Kind, fill};
+use serde_json::Value;
 use std::fmt::Write;
 
 /// Widest line of the comments.
@@ -49,10 +50,15 @@ pub fn template(method: &dyn Method) -> String {
         let _ = writeln!(text, "# claims = [{}]\n", quote(claim.id));
     }
     models(&mut text, method);
-    comment(&mut text, "Held for every job. What stands in comments is the default.");
+    comment(
+        &mut text,
+        "Held for every job. What stands in comments is the default, or an example where there is none.",
+    );
     text.push_str("[settings]\n");
     let held = varied.as_ref().map(|(name, _)| *name);
-    fields(&mut text, method.settings(), "settings", held);
+    // What the method makes of no settings at all: presets decide what the declarations leave open.
+    let resolved = method.canonical(Value::Object(fill(method.settings(), &Value::Null)));
+    fields(&mut text, method.settings(), "settings", held, &resolved);
     comment(
         &mut text,
         "The grid: every combination of the values of these axes is a job. An axis is \"model\", a setting",
@@ -128,6 +134,7 @@ fn models(text: &mut String, method: &dyn Method) {
                     generator
                         .parameters
                         .iter()
+                        .filter(|field| !matches!(field.default, Default::Absent))
                         .map(|field| format!("{} = {}", field.name, literal(field))),
                 );
                 let _ = writeln!(text, "{} = {{ {} }}", role.name, parts.join(", "));
@@ -152,17 +159,20 @@ fn models(text: &mut String, method: &dyn Method) {
     }
 }
 
-/// Every field as a comment with its default; required ones are written out, tables follow under headers of their own.
-fn fields(text: &mut String, fields: &[Field], path: &str, varied: Option<&str>) {
+/// Every field as a comment with its default, or what the method resolved it to; required ones are written out, tables
+/// follow under headers of their own.
+fn fields(text: &mut String, fields: &[Field], path: &str, varied: Option<&str>, resolved: &Value) {
     let is_table = |field: &&Field| matches!(field.kind, Kind::Table(_));
     for field in fields
         .iter()
         .filter(|field| !is_table(field) && Some(field.name) != varied)
     {
-        let absent = if matches!(field.default, Default::Absent) {
-            " Absent by default."
-        } else {
-            ""
+        let chosen = resolved
+            .get(field.name)
+            .filter(|_| matches!(field.default, Default::Absent));
+        let absent = match (&field.default, chosen) {
+            (Default::Absent, None) => " Absent by default; this is an example.",
+            _ => "",
         };
         comment(
             text,
@@ -173,7 +183,8 @@ fn fields(text: &mut String, fields: &[Field], path: &str, varied: Option<&str>)
         } else {
             "# "
         };
-        let _ = writeln!(text, "{mark}{} = {}\n", field.name, literal(field));
+        let value = chosen.map_or_else(|| literal(field), toml);
+        let _ = writeln!(text, "{mark}{} = {value}\n", field.name);
     }
     for field in fields.iter().filter(is_table) {
         if let Kind::Table(inner) = &field.kind {
@@ -181,8 +192,29 @@ fn fields(text: &mut String, fields: &[Field], path: &str, varied: Option<&str>)
             let name = format!("{path}.{}", field.name);
             comment(text, field.doc);
             let _ = writeln!(text, "{}[{name}]", if required { "" } else { "# " });
-            self::fields(text, inner, &name, None);
+            let within = resolved.get(field.name).unwrap_or(&Value::Null);
+            self::fields(text, inner, &name, None, within);
         }
+    }
+}
+
+/// A value on one line of TOML.
+fn toml(value: &Value) -> String {
+    match value {
+        Value::String(text) => quote(text),
+        Value::Number(value) => match value.as_i64() {
+            Some(whole) => whole.to_string(),
+            None => number(value.as_f64().unwrap_or_default()),
+        },
+        Value::Array(items) => {
+            let items: Vec<String> = items.iter().map(toml).collect();
+            format!("[{}]", items.join(", "))
+        }
+        Value::Object(entries) => {
+            let entries = entries.iter().map(|(name, value)| format!("{name} = {}", toml(value)));
+            format!("{{ {} }}", entries.collect::<Vec<_>>().join(", "))
+        }
+        Value::Bool(_) | Value::Null => value.to_string(),
     }
 }
 

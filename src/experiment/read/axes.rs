@@ -80,35 +80,6 @@ impl Axes {
     }
 }
 
-impl Axes {
-    /// The axes that refine towards `x`, which therefore tell no series apart: `x` itself and what is zipped with it; where `x`
-    /// is no axis but a figure such as an edge length, the models' numbers, save seeds, and what is zipped with them.
-    pub fn refining(&self, x: &str) -> Vec<String> {
-        let measured = self.find(x).is_none();
-        let refines = |axis: &Known| {
-            let values = axis.values.as_deref().unwrap_or_default();
-            let parameter = axis.name.starts_with("model.") && !axis.name.ends_with(".seed");
-            axis.name == x || measured && parameter && !values.is_empty() && values.iter().all(Value::is_number)
-        };
-        let mut found: Vec<String> = self
-            .known
-            .iter()
-            .filter(|axis| refines(axis))
-            .map(|axis| axis.name.clone())
-            .collect();
-        let zipped = |zip: &&Vec<Axis>| zip.iter().any(|axis| found.contains(&axis.name));
-        let mates: Vec<String> = self
-            .zips
-            .iter()
-            .filter(zipped)
-            .flatten()
-            .map(|axis| axis.name.clone())
-            .collect();
-        found.extend(mates);
-        found
-    }
-}
-
 /// The entries of a table with nested tables as dotted paths: `relaxed-newton.relaxation = [...]` needs no quotes.
 pub fn flatten<'n>(table: &'n Table, prefix: &str, found: &mut Vec<Named<'n>>) {
     for Entry { key, key_span, value } in &table.entries {

@@ -1,10 +1,11 @@
 //! Reads `[[table]]`, `[[plot]]` and `[[rate]]`.
 
+use super::axes::{Axes, Known};
 use super::{Context, Entries, axes, entries, file_name, published, sections};
 use crate::experiment::check::Checker;
 use crate::experiment::column;
 use crate::experiment::document::{Entry, Node, Table};
-use crate::experiment::file::{self, Bound, Plot, Rate};
+use crate::experiment::file::{self, Axis, Bound, Plot, Rate};
 use crate::experiment::grid;
 use crate::experiment::nearest::{list, suggestion};
 use crate::experiment::section::{PLOT, RATE, TABLE};
@@ -125,6 +126,7 @@ fn plot(checker: &mut Checker, node: &Node, context: &Context<'_>, names: &mut N
     let (x, y) = coordinates(checker, &found, context, true);
     let series = series(checker, &found, context, x.as_deref());
     let (x, y) = (x?, y?);
+    mingled(checker, &found, context, &condition, &x, &series);
     let name = found.text("name").unwrap_or_else(|| format!("{y}-{x}"));
     unique(checker, content.get("name"), node, &name, "plot", names);
     let log = found.text("log").unwrap_or_default();
@@ -163,6 +165,7 @@ fn rate(checker: &mut Checker, node: &Node, context: &Context<'_>, names: &mut N
         _ => None,
     };
     let (x, y) = (x?, y?);
+    mingled(checker, &found, context, &condition, &x, &series);
     let name = found.text("name").unwrap_or_else(|| format!("{y}-{x}-rate"));
     unique(checker, content.get("name"), node, &name, "rate", names);
     Some(Rate {
@@ -223,11 +226,79 @@ fn series(checker: &mut Checker, found: &Entries<'_>, context: &Context<'_>, x: 
     match found.nodes.get("series") {
         Some(entry) => axes::axis_names(checker, &entry.value, "series", context.axes),
         None => {
-            let refining = context.axes.refining(x.unwrap_or(""));
+            let refining = refining(context.axes, x.unwrap_or(""));
             let mut names = context.axes.varying();
             names.retain(|name| !refining.contains(name));
             names
         }
+    }
+}
+
+/// The axes that refine towards `x`, which therefore tell no series apart: `x` itself and what is zipped with it; where `x` is no
+/// axis but a figure such as an edge length, the models' numbers, save seeds, and what is zipped with them.
+fn refining(axes: &Axes, x: &str) -> Vec<String> {
+    let measured = axes.find(x).is_none();
+    let refines = |axis: &&Known| {
+        let parameter = axis.name.starts_with("model.") && !axis.name.ends_with(".seed");
+        axis.name == x || measured && parameter && numeric(axis)
+    };
+    let refined = axes.known.iter().filter(refines);
+    let mut found: Vec<String> = refined.map(|axis| axis.name.clone()).collect();
+    let zipped = |zip: &&Vec<Axis>| zip.iter().any(|axis| found.contains(&axis.name));
+    let mates = axes.zips.iter().filter(zipped).flatten();
+    let mates: Vec<String> = mates.map(|axis| axis.name.clone()).collect();
+    found.extend(mates);
+    found
+}
+
+fn numeric(axis: &Known) -> bool {
+    let values = axis.values.as_deref().unwrap_or_default();
+    !values.is_empty() && values.iter().all(Value::is_number)
+}
+
+/// Warns when a series joins jobs that differ in more than what refines them. Numbers may refine towards a measured x, and
+/// seeds are spread.
+fn mingled(
+    checker: &mut Checker,
+    found: &Entries<'_>,
+    context: &Context<'_>,
+    condition: &file::Condition,
+    x: &str,
+    series: &[String],
+) {
+    let Some(entry) = found.nodes.get("series") else {
+        return;
+    };
+    // A trace is a line of one job.
+    if context.method.traces().iter().any(|(trace, _)| *trace == x) {
+        return;
+    }
+    let refining = refining(context.axes, x);
+    let measured = context.axes.find(x).is_none();
+    let seed = |name: &str| name == "seed" || name.ends_with(".seed");
+    let left_out = |axis: &&Known| {
+        !(series.contains(&axis.name) || refining.contains(&axis.name) || seed(&axis.name))
+            && !(measured && numeric(axis))
+    };
+    let jobs = || context.points.iter().filter(|point| grid::matches(condition, point));
+    let differ = |name: &str| {
+        let mut values = jobs().filter_map(|point| point.iter().find(|(axis, _)| axis == name).map(|(_, value)| value));
+        let first = values.next();
+        values.any(|value| Some(value) != first)
+    };
+    let names: Vec<&str> = context
+        .axes
+        .known
+        .iter()
+        .filter(left_out)
+        .map(|axis| axis.name.as_str())
+        .filter(|name| differ(name))
+        .collect();
+    if !names.is_empty() {
+        let names = names.join(" and ");
+        let message = format!("each series joins jobs that differ in {names}");
+        checker.warning(entry.value.span.clone(), message).help =
+            Some(format!("add {names} to \"series\", or say which jobs with \"where\""));
     }
 }
 

@@ -127,6 +127,11 @@ impl Numbering {
         }
     }
 
+    /// How many places in the order are unknowns; [`Self::count`] has those that are kept for known fields too.
+    pub(super) fn unknown_count(&self) -> usize {
+        self.index.iter().flatten().filter(|&&index| index != NONE).count()
+    }
+
     /// The vertex of the mesh at a place in the order.
     pub(super) fn vertex(&self, place: u32) -> u32 {
         self.order.get(place as usize).copied().unwrap_or(place)

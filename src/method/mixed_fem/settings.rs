@@ -201,6 +201,11 @@ impl Settings {
         }
     }
 
+    /// Whether a singular system ends in a result that tells so. Only the unstabilised one is known to be singular.
+    pub fn goes_on_singular(&self) -> bool {
+        self.scheme() == Scheme::Unstabilised && self.on_singular == OnSingular::Continue
+    }
+
     /// The settings as a table without those that cannot change the result.
     pub fn canonical(&self) -> Value {
         let Ok(Value::Object(mut table)) = serde_json::to_value(self) else {
@@ -306,6 +311,15 @@ pub fn check(settings: &Value) -> Vec<(String, String)> {
             error(
                 "handles",
                 format!("handle {index} (from 0) has a motion but is not moved; set role = \"moved\""),
+            );
+        }
+        if !motion && handle.role == Role::Moved {
+            error(
+                "handles",
+                format!(
+                    "handle {index} (from 0) is moved but has no motion; give \"translate\", \"turn\" or \"stretch\", or set \
+                     role = \"fixed\""
+                ),
             );
         }
     }

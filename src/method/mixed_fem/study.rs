@@ -7,7 +7,7 @@ use super::metrics;
 use super::model::Model;
 use super::planar_data::{self, Derivatives};
 use super::scheme::{Data, Discretization, Scheme};
-use super::settings::{Condition, DataKind, Fill, OnSingular, Settings, Solver};
+use super::settings::{Condition, DataKind, Fill, Settings, Solver};
 use super::singular;
 use super::surface_study;
 use super::system::{System, mixed_nullity};
@@ -131,7 +131,7 @@ fn function_study(
     go_on(observer)?;
     let values = match solve(&domain, &data, settings, &mut report, observer) {
         // Asked to go on, a job without a solution still tells the nullity.
-        Err(failure) if failure.kind == "singular" && settings.on_singular == OnSingular::Continue => {
+        Err(failure) if failure.kind == "singular" && settings.goes_on_singular() => {
             return Ok(Outcome {
                 stop: failure.kind,
                 reason: failure.reason,
@@ -253,13 +253,34 @@ pub(super) fn compare(
 ) -> Result<(), Failure> {
     if settings.compare && settings.has_one_field() {
         observer.phase("compare");
-        let mut other = System::new(
+        let solved = System::new(
             discretization,
             !settings.one_field(),
             Solver::Auto,
             &mut Quiet(observer),
-        )?;
-        let compared = other.solve(discretization, &mut Quiet(observer))?;
+        )
+        .and_then(|mut other| {
+            let compared = other.solve(discretization, &mut Quiet(observer))?;
+            Ok((other, compared))
+        });
+        let (other, compared) = match solved {
+            Err(failure) if failure.kind == "singular" => {
+                report.note(format!(
+                    "the system to compare with has no solution: {}",
+                    failure.reason
+                ));
+                return Ok(());
+            }
+            solved => solved?,
+        };
+        if !(compared.accuracy.forward < INACCURATE) {
+            report.note(format!(
+                "the system to compare with, solved by {}, is so ill-conditioned that rounding alone may change its solution \
+                 by {:.0e} of its size; most of \"difference\" may be that",
+                other.solver(),
+                compared.accuracy.forward
+            ));
+        }
         report.count("factorizations", other.factorizations);
         report.count("solutions", discretization.components as u64);
         let size = values.iter().fold(0.0, |size: f64, value| size.max(value.abs()));
@@ -324,6 +345,10 @@ impl Report {
         self.metrics.insert(name.to_string(), value);
     }
 
+    pub(super) fn note(&mut self, notice: String) {
+        self.notices.push(notice);
+    }
+
     pub(super) fn count(&mut self, name: &str, more: u64) {
         *self.counters.entry(name.to_string()).or_default() += more;
     }
@@ -361,7 +386,7 @@ impl Report {
         );
         // Only a lumped mass keeps the unknown v out of the boundary rows.
         let certain = settings.mass != super::scheme::Mass::Full;
-        if certain && settings.on_singular == OnSingular::Refuse {
+        if certain && !settings.goes_on_singular() {
             return Err(Failure {
                 kind: "singular".to_string(),
                 reason: format!("{sentence}; use curve = \"stabilised\" or \"second-order-ring\""),

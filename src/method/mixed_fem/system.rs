@@ -140,7 +140,10 @@ impl System {
     }
 
     pub fn unknowns(&self) -> usize {
-        self.factorization.dimension()
+        match &self.form {
+            Form::OneField => self.factorization.dimension(),
+            Form::Mixed(numbering) => numbering.unknown_count(),
+        }
     }
 
     pub fn matrix_entries(&self) -> usize {

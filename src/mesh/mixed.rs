@@ -324,8 +324,8 @@ impl MixedMesh {
                 next += 1;
                 for &(other, alike) in &neighbours[cell] {
                     if turns[other].is_none() {
-                        turns[other] = Some(turn != !alike);
-                        part.push((other, turn != !alike));
+                        turns[other] = Some(turn == alike);
+                        part.push((other, turn == alike));
                     }
                 }
             }

@@ -481,9 +481,8 @@ impl Settings {
                 stages = default_schedule(
                     order,
                     &text("raise"),
-                    far,
+                    (far, whole("far_steps").unwrap_or(if paper { 1 } else { 3 })),
                     number("lambda"),
-                    whole("far_steps").unwrap_or(if paper { 1 } else { 3 }),
                     limit,
                     tolerance,
                     flag("adaptive"),
@@ -589,9 +588,8 @@ impl Settings {
 fn default_schedule(
     order: usize,
     raise: &str,
-    far: f64,
+    (far, far_steps): (f64, usize),
     close: f64,
-    far_steps: usize,
     iterations: u64,
     tolerance: f64,
     adaptive: bool,

@@ -261,8 +261,8 @@ pub static FIELDS: &[Field] = &[
         name: "coarse_tolerance",
         kind: Kind::Number { min: 0.0, max: 1.0 },
         default: Default::Absent,
-        doc: "The same for all stages but the last, where larger: what a low order cannot follow is not forced, which would \
-              crush elements. Preset best: 1e-3, paper: 0.",
+        doc: "The same for all stages but the last, where larger: 1e-3 saves most of their iterations, but leaves some \
+              templates worse placed for the next order. 0 when absent.",
     },
     Field {
         name: "untangle",
@@ -459,7 +459,7 @@ impl Settings {
             value.unwrap_or(if paper { 0.0 } else { best })
         };
         let tolerance = given("change_tolerance", 1e-5);
-        let coarse_tolerance = tolerance.max(given("coarse_tolerance", 1e-3));
+        let coarse_tolerance = tolerance.max(given("coarse_tolerance", 0.0));
         let mut stages = Vec::new();
         match settings.get("schedule").and_then(Value::as_array) {
             Some(list) => {

@@ -2,6 +2,7 @@
 
 mod catmull_clark;
 mod centroidal_voronoi;
+mod certificates;
 mod closest_point;
 mod commands;
 mod connectivity;

@@ -3,13 +3,12 @@
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use vargeo::fem::basis;
-use vargeo::fem::batches::unit_reference;
 use vargeo::fem::boundary::Boundary;
-use vargeo::fem::certificate::{Certifier, Verdict};
 use vargeo::fem::coefficient_file;
 use vargeo::fem::space::Space;
 use vargeo::mesh::TriangleMesh;
-use vargeo::mesh::mixed::{MixedMesh, Shape};
+use vargeo::mesh::format::Content;
+use vargeo::mesh::mixed::MixedMesh;
 use vargeo::mesh::template::{carve, collapse, extrude, grid, pillow, voxels};
 use vargeo::method::model::{LoadedModel, Part};
 use vargeo::method::volume_fit::VolumeFit;
@@ -108,6 +107,45 @@ fn bad_input_is_named() {
     assert!(reason(falling).contains("orders only rise"));
     let voxels = fit(json!({ "generate": "voxels" }), None, json!({}));
     assert!(reason(voxels).contains("need a target surface"));
+
+    // Files, which nothing has looked at before.
+    let file = |template: &str, target: &str| {
+        let part = |name: &str, text: &str| Part::File {
+            name: name.to_string(),
+            bytes: text.as_bytes().to_vec(),
+            parameters: json!({}),
+        };
+        let mut parts = BTreeMap::new();
+        parts.insert("template".to_string(), part("template.mesh", template));
+        if !target.is_empty() {
+            parts.insert("target".to_string(), part("target.obj", target));
+        }
+        let inputs = Inputs {
+            settings: &json!({ "order": 1, "iteration_limit": 3 }),
+            model: LoadedModel { parts },
+        };
+        VolumeFit.run(inputs, &mut Silent)
+    };
+    let cube = "MeshVersionFormatted 2\nDimension 3\nVertices\n8\n0 0 0 0\n1 0 0 0\n1 1 0 0\n0 1 0 0\n0 0 1 0\n1 0 1 0\n1 1 1 0\n0 1 1 0\n";
+    let crack = cube.replace("Vertices\n8", "Vertices\n9").to_string()
+        + "2 0.5 0.5 0\nHexahedra\n1\n1 2 3 4 5 6 7 8 0\nTetrahedra\n2\n2 3 7 9 0\n2 7 6 9 0\nEnd\n";
+    let found = reason(file(&crack, ""));
+    assert!(found.contains("lies on the quad"), "{found}");
+    let whole = format!("{cube}Hexahedra\n1\n1 2 3 4 5 6 7 8 0\nEnd\n");
+    let corners = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n";
+    let notices = |target: &str| file(&whole, target).unwrap().notices.join("; ");
+    let closed = format!("{corners}f 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n");
+    assert!(!notices(&closed).contains("does not enclose"));
+    let turned = format!("{corners}f 1 2 3\nf 1 4 2\nf 2 4 3\nf 3 4 1\n");
+    assert!(notices(&turned).contains("inside out"), "{}", notices(&turned));
+    let open = format!("{corners}f 1 3 2\nf 1 2 4\nf 2 3 4\n");
+    assert!(notices(&open).contains("3 have one triangle"), "{}", notices(&open));
+    let flipped = format!("{corners}f 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 4 1\n");
+    assert!(
+        notices(&flipped).contains("3 have triangles of opposite"),
+        "{}",
+        notices(&flipped)
+    );
 }
 
 /// Euler characteristic of the boundary and volume.
@@ -231,94 +269,6 @@ fn the_sampled_boundary_is_closed_and_follows_the_nodes() {
 }
 
 #[test]
-fn certificates_agree_with_stored_verdicts() {
-    let records: Vec<Value> = serde_json::from_str(include_str!("golden/certificates.json")).unwrap();
-    let mut seen = [0, 0];
-    for record in &records {
-        let mut mesh = MixedMesh {
-            points: Shape::Hexahedron.canonical().to_vec(),
-            ..MixedMesh::default()
-        };
-        mesh.push(Shape::Hexahedron, &[0, 1, 2, 3, 4, 5, 6, 7]);
-        let topology = mesh.topology().unwrap();
-        let name = if record["family"] == "fourier" {
-            "integrated-fourier"
-        } else {
-            "integrated-legendre"
-        };
-        let basis = basis::find(name).unwrap();
-        let order = 4;
-        let space = Space::new(&mesh, &topology, basis, &[order]).unwrap();
-        // Stored nodes come by vertices, edges, faces and cell in the element's own order.
-        let mut nodes: Vec<usize> = (0..8).collect();
-        for &edge in &topology.cell_edges[0] {
-            nodes.extend((0..order - 1).map(|j| space.edge(edge as usize).0 + j));
-        }
-        for &face in &topology.cell_faces[0] {
-            nodes.extend((0..(order - 1) * (order - 1)).map(|jk| space.face(face as usize).0 + jk));
-        }
-        nodes.extend((0..(order - 1).pow(3)).map(|ijk| space.inside(0) + ijk));
-        let mut x = vec![0.0; 3 * space.nodes];
-        for (node, values) in nodes.iter().zip(record["nodes"].as_array().unwrap()) {
-            for axis in 0..3 {
-                x[3 * node + axis] = values[axis].as_f64().unwrap();
-            }
-        }
-        let certifier = Certifier::new(basis, space.cells.iter().map(|cell| cell.kind), 20_000);
-        match certifier.judge(&space, 0, &unit_reference(Shape::Hexahedron), &x) {
-            Verdict::Positive(bound) => {
-                assert_eq!(record["verdict"], "positive");
-                assert!(bound > 0.0);
-                seen[0] += 1;
-            }
-            Verdict::Negative(_, value) => {
-                assert_eq!(record["verdict"], "negative");
-                assert!(value <= 0.0);
-                seen[1] += 1;
-            }
-            Verdict::Undecided => panic!("undecided, stored: {}", record["verdict"]),
-        }
-    }
-    assert!(seen[0] > 2 && seen[1] > 1, "{seen:?}");
-}
-
-#[test]
-fn certificates_of_prisms_and_tetrahedra_hold_and_find_failures() {
-    let basis = basis::find("integrated-legendre").unwrap();
-    for shape in [Shape::Prism, Shape::Tetrahedron] {
-        let mut mesh = MixedMesh {
-            points: shape.canonical().to_vec(),
-            ..MixedMesh::default()
-        };
-        mesh.push(shape, &(0..shape.corners() as u32).collect::<Vec<_>>());
-        let topology = mesh.topology().unwrap();
-        let space = Space::new(&mesh, &topology, basis, &[3]).unwrap();
-        let certifier = Certifier::new(basis, space.cells.iter().map(|cell| cell.kind), 4000);
-        for (size, positive) in [(0.0, true), (0.05, true), (1.5, false)] {
-            let mut x = space.linear(&mesh.points);
-            for (place, value) in x.iter_mut().enumerate().skip(3 * space.vertices) {
-                *value = size * (1.3 * place as f64).sin();
-            }
-            let verdict = certifier.judge(&space, 0, &unit_reference(shape), &x);
-            assert_eq!(
-                matches!(verdict, Verdict::Positive(_)),
-                positive,
-                "{shape:?} {size}: {verdict:?}"
-            );
-            assert_eq!(matches!(verdict, Verdict::Negative(..)), !positive);
-            if size == 0.0 {
-                let Verdict::Positive(bound) = verdict else {
-                    unreachable!()
-                };
-                let exact =
-                    shape.canonical_volume() / vargeo::fem::batches::reference_volume(shape, &unit_reference(shape));
-                assert!((bound - exact).abs() < 1e-9, "{bound} {exact}");
-            }
-        }
-    }
-}
-
-#[test]
 fn a_shell_takes_its_thickness_and_leaves_the_surface_where_it_is() {
     let outcome = fit(
         json!({ "generate": "shell", "distance": 4.0, "layers": 2, "side": "both" }),
@@ -425,4 +375,51 @@ fn a_subdivision_volume_comes_nearer_with_every_level() {
         json!({ "order": 2, "subdivision_levels": 1 }),
     );
     assert!(refused.unwrap_err().reason.contains("order = 1"));
+}
+
+#[test]
+fn cells_numbered_inside_out_are_turned_and_folded_ones_are_not() {
+    let mut mesh = grid::grid([3, 3, 3]);
+    let right = mesh.clone();
+    let content = |mesh: &MixedMesh| Content {
+        points: mesh.points.clone(),
+        hexahedra: mesh.hexahedra.clone(),
+        ..Content::default()
+    };
+    for (place, cell) in mesh.hexahedra.iter_mut().enumerate() {
+        if place % 4 == 1 {
+            *cell = [cell[4], cell[5], cell[6], cell[7], cell[0], cell[1], cell[2], cell[3]];
+        }
+    }
+    let (turned, notices) = MixedMesh::from_content(&content(&mesh)).unwrap();
+    assert_eq!(turned, right);
+    assert!(notices[0].starts_with("7 cells"), "{notices:?}");
+    // The middle cell's first corner is moved beyond its last: a fold, which no numbering mends.
+    let mut folded = right.clone();
+    let corner = folded.hexahedra[13][0] as usize;
+    folded.points[corner] = [4.0, 4.0, 4.0];
+    let (kept, notices) = MixedMesh::from_content(&content(&folded)).unwrap();
+    assert_eq!((kept, notices.len()), (folded.clone(), 0));
+    folded.topology().unwrap();
+}
+
+#[test]
+fn single_orders_rise_where_the_boundary_is_far() {
+    let run = |settings: Value| {
+        fit(
+            json!({ "generate": "grid", "x": 2, "y": 1, "z": 1 }),
+            Some(json!({ "shape": "pebble", "triangles": 500 })),
+            settings,
+        )
+        .unwrap()
+    };
+    let linear = run(json!({ "order": 1, "iteration_limit": 30 }));
+    for indicator in ["distance", "energy"] {
+        let raised = run(
+            json!({ "order": 3, "adaptive": true, "adaptive_indicator": indicator, "adaptive_steps": 2, "adaptive_share": 0.3, "iteration_limit": 30 }),
+        );
+        assert!(raised.metrics["node_share"] < 100.0 && raised.metrics["nodes"] > linear.metrics["nodes"]);
+        assert!(raised.metrics["hausdorff"] < linear.metrics["hausdorff"], "{indicator}");
+        assert_eq!(raised.metrics["inverted"], 0.0);
+    }
 }

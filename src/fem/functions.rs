@@ -170,46 +170,81 @@ pub fn line_table(basis: &dyn Basis, order: usize, points: &[f64]) -> Table<1> {
 }
 
 /// The functions of a triangle: corners, edges by [`TRIANGLE_EDGES`], then inside with `c = last`, a and b being the
-/// other two in ascending order.
+/// other two in ascending order. `edge(a, b, j)` is `E_ab,j` and `weighted(c, k)` is `l_c c_k(l_c)`, as numbers or whatever
+/// is to be known of them.
+pub fn triangle_row<T: Copy + Mul<Output = T>>(
+    order: usize,
+    last: usize,
+    corners: &[T; 3],
+    edge: impl Fn(usize, usize, usize) -> T,
+    weighted: impl Fn(usize, usize) -> T,
+) -> Vec<T> {
+    let [a, b] = [[1, 2], [0, 2], [0, 1]][last];
+    let mut row = corners.to_vec();
+    for [a, b] in TRIANGLE_EDGES {
+        row.extend((1..order).map(|j| edge(a, b, j)));
+    }
+    row.extend(
+        triangle_inside(order)
+            .iter()
+            .map(|&[j, k]| edge(a, b, j) * weighted(last, k)),
+    );
+    row
+}
+
+/// The functions of a tetrahedron whose corners are in ascending order: corners, edges and faces as
+/// [`Shape::edges`](crate::mesh::mixed::Shape::edges) and faces 012, 013, 023, 123, inside; the rest as in
+/// [`triangle_row`].
+pub fn tetrahedron_row<T: Copy + Mul<Output = T>>(
+    order: usize,
+    corners: &[T; 4],
+    edge: impl Fn(usize, usize, usize) -> T,
+    weighted: impl Fn(usize, usize) -> T,
+) -> Vec<T> {
+    let mut row = corners.to_vec();
+    for [a, b] in [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]] {
+        row.extend((1..order).map(|j| edge(a, b, j)));
+    }
+    let faces = triangle_inside(order);
+    for [a, b, c] in [[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]] {
+        row.extend(faces.iter().map(|&[j, k]| edge(a, b, j) * weighted(c, k)));
+    }
+    let inside = tetrahedron_inside(order);
+    row.extend(
+        inside
+            .iter()
+            .map(|&[i, j, k]| edge(0, 1, i) * weighted(2, j) * weighted(3, k)),
+    );
+    row
+}
+
+/// The functions of a triangle as in [`triangle_row`] at points.
 pub fn triangle_table(basis: &dyn Basis, order: usize, last: usize, points: &[[f64; 2]]) -> Table<2> {
     let mut table = Table::new(triangle_functions(order));
-    let [a, b] = [[1, 2], [0, 2], [0, 1]][last];
-    let inside = triangle_inside(order);
     for &point in points {
         let l: [Dual<2>; 3] = barycentric(point);
-        let edge = |a: usize, b: usize, j: usize| edge_function(basis, l[a], l[b], j);
-        let mut row = l.to_vec();
-        for [a, b] in TRIANGLE_EDGES {
-            row.extend((1..order).map(|j| edge(a, b, j)));
-        }
-        for &[j, k] in &inside {
-            row.push(edge(a, b, j) * l[last] * l[last].of(basis.factor(k, l[last].value)));
-        }
-        table.push(&row);
+        table.push(&triangle_row(
+            order,
+            last,
+            &l,
+            |a, b, j| edge_function(basis, l[a], l[b], j),
+            |c, k| l[c] * l[c].of(basis.factor(k, l[c].value)),
+        ));
     }
     table
 }
 
-/// The functions of a tetrahedron whose corners are in ascending order: corners, edges and faces as
-/// [`Shape::edges`](crate::mesh::mixed::Shape::edges) and faces 012, 013, 023, 123, inside.
+/// The functions of a tetrahedron as in [`tetrahedron_row`] at points.
 pub fn tetrahedron_table(basis: &dyn Basis, order: usize, points: &[[f64; 3]]) -> Table<3> {
     let mut table = Table::new(tetrahedron_functions(order));
-    let (faces, inside) = (triangle_inside(order), tetrahedron_inside(order));
     for &point in points {
         let l: [Dual<3>; 4] = barycentric(point);
-        let edge = |a: usize, b: usize, j: usize| edge_function(basis, l[a], l[b], j);
-        let weighted = |c: usize, k: usize| l[c] * l[c].of(basis.factor(k, l[c].value));
-        let mut row = l.to_vec();
-        for [a, b] in [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]] {
-            row.extend((1..order).map(|j| edge(a, b, j)));
-        }
-        for [a, b, c] in [[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]] {
-            row.extend(faces.iter().map(|&[j, k]| edge(a, b, j) * weighted(c, k)));
-        }
-        for &[i, j, k] in &inside {
-            row.push(edge(0, 1, i) * weighted(2, j) * weighted(3, k));
-        }
-        table.push(&row);
+        table.push(&tetrahedron_row(
+            order,
+            &l,
+            |a, b, j| edge_function(basis, l[a], l[b], j),
+            |c, k| l[c] * l[c].of(basis.factor(k, l[c].value)),
+        ));
     }
     table
 }

@@ -45,6 +45,29 @@ pub fn lagrange(
         };
         wanted.min(highest)
     };
+    let approximated = space
+        .cells
+        .iter()
+        .filter(|cell| cell.kind.order > 1 && (!polynomial || cell.kind.order > highest))
+        .count();
+    Ok(Lagrange {
+        mesh: sampled(volume, space, references, x, &order)?,
+        approximated,
+    })
+}
+
+/// The values of a map on an even lattice of every cell, of the order that its kind is to have. Cells that share a point
+/// share its number.
+///
+/// # Errors
+/// When the reference of a cell is flat.
+pub fn sampled(
+    volume: &MixedMesh,
+    space: &Space,
+    references: &[Columns<f64>],
+    x: &[f64],
+    order: &dyn Fn(Kind) -> usize,
+) -> Result<CurvedMesh, String> {
     let batches = Batches::new(space, references, &|kind| {
         Rule::Trapezoid.cell(kind.shape, order(kind) + 1)
     })?;
@@ -100,15 +123,7 @@ pub fn lagrange(
             cells[cell].nodes[finds[&(shape, m)][&coordinates]] = number;
         });
     }
-    let approximated = space
-        .cells
-        .iter()
-        .filter(|cell| cell.kind.order > 1 && (!polynomial || cell.kind.order > highest))
-        .count();
-    Ok(Lagrange {
-        mesh: CurvedMesh { points, cells },
-        approximated,
-    })
+    Ok(CurvedMesh { points, cells })
 }
 
 /// The weights of a lattice point over a cell's vertices, in lowest terms.

@@ -124,6 +124,38 @@ impl Space {
                 orders[cell]
             ));
         }
+        let mut space = Space::without_slots(mesh, topology, basis, orders)?;
+        for (cell, (shape, corners)) in mesh.iter().enumerate() {
+            let slots = match shape {
+                Shape::Hexahedron => space.hexahedron(topology, cell, corners),
+                Shape::Prism => space.prism(topology, cell, corners),
+                Shape::Tetrahedron => space.tetrahedron(topology, cell, corners),
+            };
+            space.cells.push(slots);
+        }
+        Ok(space)
+    }
+
+    /// Number of nodes of the space over a mesh with these orders, each within its range, at the cost of the topology.
+    ///
+    /// # Errors
+    /// When there are too many nodes to number.
+    pub fn count(
+        mesh: &MixedMesh,
+        topology: &Topology,
+        basis: &'static dyn Basis,
+        orders: &[usize],
+    ) -> Result<usize, String> {
+        Ok(Space::without_slots(mesh, topology, basis, orders)?.nodes)
+    }
+
+    /// All nodes numbered, the cells' slots still empty.
+    fn without_slots(
+        mesh: &MixedMesh,
+        topology: &Topology,
+        basis: &'static dyn Basis,
+        orders: &[usize],
+    ) -> Result<Space, String> {
         let mut edge_orders = vec![HIGHEST_ORDER; topology.edges.len()];
         let mut face_orders = vec![HIGHEST_ORDER; topology.faces.len()];
         for (cell, &order) in orders.iter().enumerate() {
@@ -163,7 +195,7 @@ impl Space {
                 "{nodes} nodes are too many; lower the order or use fewer cells"
             ));
         }
-        let mut space = Space {
+        Ok(Space {
             basis,
             orders: orders.to_vec(),
             cells: Vec::with_capacity(orders.len()),
@@ -174,16 +206,7 @@ impl Space {
             face_starts,
             face_orders,
             cell_starts,
-        };
-        for (cell, (shape, corners)) in mesh.iter().enumerate() {
-            let slots = match shape {
-                Shape::Hexahedron => space.hexahedron(topology, cell, corners),
-                Shape::Prism => space.prism(topology, cell, corners),
-                Shape::Tetrahedron => space.tetrahedron(topology, cell, corners),
-            };
-            space.cells.push(slots);
-        }
-        Ok(space)
+        })
     }
 
     /// Node numbers of an edge, and its order.

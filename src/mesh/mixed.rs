@@ -7,7 +7,7 @@
 //! that every point of a cell has a positive Jacobian, or that distant cells do not overlap.
 
 use super::format::Content;
-use super::{TriangleMesh, cross, determinant, dot, subtract};
+use super::{TriangleMesh, cross, dot, subtract};
 
 /// The kinds of cells a mixed mesh is made of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -286,27 +286,77 @@ impl MixedMesh {
         }
     }
 
-    /// Turns cells of negative volume and counts them.
+    /// Turns cells that are numbered the other way round and counts them: in every connected part all cells are numbered
+    /// as their neighbours are, and its volume is positive. A cell that folding has turned inside out is left alone.
     fn turn_reversed(&mut self) -> usize {
-        let points = &self.points;
+        let mut faces = Vec::new();
+        for (index, (shape, corners)) in self.iter().enumerate() {
+            for face in shape.faces() {
+                let (sorted, cycle) = face_key(corners, face);
+                faces.push((sorted, index, cycle));
+            }
+        }
+        faces.sort_unstable();
+        // Neighbours, and whether they are numbered alike: then their common face runs in opposite ways.
+        let mut neighbours: Vec<Vec<(usize, bool)>> = vec![Vec::new(); self.cells()];
+        for pair in faces.windows(2) {
+            let ((key, first, cycle), (other, second, cycle_there)) = (pair[0], pair[1]);
+            if key == other {
+                let corners = if cycle[3] == NONE { 3 } else { 4 };
+                let alike = reversed_cycle(&cycle[..corners], &cycle_there);
+                neighbours[first].push((second, alike));
+                neighbours[second].push((first, alike));
+            }
+        }
+        let volumes: Vec<f64> = self
+            .iter()
+            .map(|(shape, corners)| volume(&self.points, shape, corners))
+            .collect();
+        let mut turns: Vec<Option<bool>> = vec![None; volumes.len()];
+        for start in 0..turns.len() {
+            if turns[start].is_some() {
+                continue;
+            }
+            turns[start] = Some(false);
+            let mut part = vec![(start, false)];
+            let mut next = 0;
+            while let Some(&(cell, turn)) = part.get(next) {
+                next += 1;
+                for &(other, alike) in &neighbours[cell] {
+                    if turns[other].is_none() {
+                        turns[other] = Some(turn == alike);
+                        part.push((other, turn == alike));
+                    }
+                }
+            }
+            let whole: f64 = part
+                .iter()
+                .map(|&(cell, turn)| if turn { -volumes[cell] } else { volumes[cell] })
+                .sum();
+            if whole < 0.0 {
+                for (cell, turn) in part {
+                    turns[cell] = Some(!turn);
+                }
+            }
+        }
         let mut turned = 0;
-        for cell in &mut self.hexahedra {
-            if volume(points, Shape::Hexahedron, cell) < 0.0 {
+        let mut turns = turns
+            .into_iter()
+            .map(|turn| turn == Some(true))
+            .inspect(|&turn| turned += usize::from(turn));
+        // The order of `iter`.
+        for (cell, turn) in self.hexahedra.iter_mut().zip(&mut turns) {
+            if turn {
                 *cell = [cell[4], cell[5], cell[6], cell[7], cell[0], cell[1], cell[2], cell[3]];
-                turned += 1;
             }
         }
-        for cell in &mut self.prisms {
-            if volume(points, Shape::Prism, cell) < 0.0 {
+        for (cell, turn) in self.prisms.iter_mut().zip(&mut turns) {
+            if turn {
                 *cell = [cell[3], cell[4], cell[5], cell[0], cell[1], cell[2]];
-                turned += 1;
             }
         }
-        // A tetrahedron alone cannot be told from an inverted one of a folded mesh: turned only when all are reversed.
-        let reversed = |cell: &[u32; 4]| determinant(cell.map(|corner| points[corner as usize])) < 0.0;
-        if !self.tetrahedra.is_empty() && self.tetrahedra.iter().all(reversed) {
-            turned += self.tetrahedra.len();
-            for cell in &mut self.tetrahedra {
+        for (cell, turn) in self.tetrahedra.iter_mut().zip(&mut turns) {
+            if turn {
                 cell.swap(2, 3);
             }
         }
@@ -333,12 +383,7 @@ impl MixedMesh {
                 edges.push([corners[a].min(corners[b]), corners[a].max(corners[b])]);
             }
             for (place, face) in shape.faces().iter().enumerate() {
-                let mut cycle = [NONE; 4];
-                for (corner, &local) in cycle.iter_mut().zip(*face) {
-                    *corner = corners[local];
-                }
-                let mut sorted = cycle;
-                sorted.sort_unstable();
+                let (sorted, cycle) = face_key(corners, face);
                 faces.push((sorted, index as u32, place as u32, cycle));
             }
         }
@@ -381,7 +426,7 @@ impl MixedMesh {
             topology.cell_faces[first as usize][place as usize] = number;
             if count == 2 {
                 let (_, second, place, other) = faces[start + 1];
-                if !reversed(face.corners(), &other) {
+                if !reversed_cycle(face.corners(), &other) {
                     return Err(format!(
                         "cells {first} and {second} lie on the same side of their face with vertices {:?}, or number it \
                          differently; renumber or remove one of them",
@@ -405,9 +450,34 @@ impl Topology {
         self.faces.iter().enumerate().filter(|(_, face)| face.on_boundary())
     }
 
-    /// Whether every directed edge of the boundary has its reverse: where it has not, faces do not match.
+    /// Whether every directed edge of the boundary has its reverse, and no boundary triangle lies on a boundary quad:
+    /// where it is otherwise, faces do not match.
     fn check_boundary(&self) -> Result<(), String> {
         let mut sides = Vec::new();
+        let mut halves = Vec::new();
+        for (_, face) in self.boundary() {
+            if let [a, b, c, d] = *face.corners() {
+                for mut half in [[a, b, c], [b, c, d], [c, d, a], [d, a, b]] {
+                    half.sort_unstable();
+                    halves.push((half, [a, b, c, d]));
+                }
+            }
+        }
+        halves.sort_unstable();
+        for (_, face) in self.boundary() {
+            if let [a, b, c] = *face.corners() {
+                let mut key = [a, b, c];
+                key.sort_unstable();
+                if let Ok(place) = halves.binary_search_by(|half| half.0.cmp(&key)) {
+                    return Err(format!(
+                        "the triangle with vertices {:?} lies on the quad with vertices {:?}: a cell's quad meets two \
+                         triangles there, which leaves a crack; cut the cell, or join the two others by a prism",
+                        face.corners(),
+                        halves[place].1
+                    ));
+                }
+            }
+        }
         for (_, face) in self.boundary() {
             let corners = face.corners();
             for (place, &corner) in corners.iter().enumerate() {
@@ -442,8 +512,19 @@ impl Topology {
     }
 }
 
+/// The vertices of a face of a cell in ascending order, and as they run; a triangle's fourth is [`NONE`].
+fn face_key(corners: &[u32], face: &[usize]) -> ([u32; 4], [u32; 4]) {
+    let mut cycle = [NONE; 4];
+    for (corner, &local) in cycle.iter_mut().zip(face) {
+        *corner = corners[local];
+    }
+    let mut sorted = cycle;
+    sorted.sort_unstable();
+    (sorted, cycle)
+}
+
 /// Whether `other` runs through the corners of `cycle` the other way round.
-fn reversed(cycle: &[u32], other: &[u32; 4]) -> bool {
+fn reversed_cycle(cycle: &[u32], other: &[u32; 4]) -> bool {
     let count = cycle.len();
     let Some(start) = other[..count].iter().position(|&corner| corner == cycle[0]) else {
         return false;

@@ -11,6 +11,10 @@ use std::time::{Duration, Instant};
 
 /// After the soft limit, which the process itself keeps, the process is killed.
 pub(super) const GRACE: Duration = Duration::from_secs(1);
+/// The phase in which a method measures what it has, also after the soft limit: a result that is there is not thrown away.
+const MEASURING: &str = "measure";
+/// It takes a quarter of the limit at most, or this.
+const LEAST_FOR_MEASURING: Duration = Duration::from_secs(10);
 /// After its end, what a process has left in its pipes is waited for; a grandchild could hold them open for ever.
 const PIPES: Duration = Duration::from_millis(500);
 /// What is kept of standard error.
@@ -138,7 +142,16 @@ impl Running {
             Heard::Message(message) => match message {
                 Message::Waiting(_) => self.deadline = None,
                 Message::Repetition(_) => self.start_clock(),
-                Message::Phase(phase) => self.phase = Some(phase),
+                Message::Phase(phase) => {
+                    if phase == MEASURING && self.phase.as_deref() != Some(MEASURING) {
+                        let more = self.limit.map(|limit| (limit / 4).max(LEAST_FOR_MEASURING));
+                        self.deadline = self
+                            .deadline
+                            .zip(more)
+                            .and_then(|(deadline, more)| deadline.checked_add(more));
+                    }
+                    self.phase = Some(phase);
+                }
                 Message::Iterate(progress) => self.progress = Some(progress),
                 Message::Warning(_) => {}
                 Message::Busy | Message::Finished { .. } | Message::Cancelled => {

@@ -47,4 +47,8 @@ impl Basis for FourierEnriched {
         // Polynomials of degree 3 have no higher derivatives to bound.
         Some(if j > 2 { (j - 2) as f64 } else { 0.0 })
     }
+
+    fn factor_frequency(&self, k: usize) -> Option<f64> {
+        Some(if k > 1 { (k - 1) as f64 } else { 0.0 })
+    }
 }

@@ -59,6 +59,10 @@ impl Basis for IntegratedFourier {
     fn frequency(&self, j: usize) -> Option<f64> {
         Some(j as f64)
     }
+
+    fn factor_frequency(&self, k: usize) -> Option<f64> {
+        Some(k as f64)
+    }
 }
 
 /// The distance to the nearer end, and the sign of `b_j(x)` against `b_j` there.

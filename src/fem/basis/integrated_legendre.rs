@@ -42,4 +42,8 @@ impl Basis for IntegratedLegendre {
     fn frequency(&self, _: usize) -> Option<f64> {
         None
     }
+
+    fn factor_frequency(&self, _: usize) -> Option<f64> {
+        None
+    }
 }

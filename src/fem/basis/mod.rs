@@ -25,6 +25,8 @@ pub trait Basis: Send + Sync {
     /// For a family with sines: the largest frequency of the bubbles up to j, so that the n-th derivative of each is at
     /// most `sqrt(2) (pi frequency)^(n-1)` for n > 5. Nothing for polynomials.
     fn frequency(&self, j: usize) -> Option<f64>;
+    /// The frequency f of the k-th factor where it is `sqrt(2) cos(f pi x)`. Nothing, or 0, for polynomials.
+    fn factor_frequency(&self, k: usize) -> Option<f64>;
 }
 
 /// Every basis, the default first.

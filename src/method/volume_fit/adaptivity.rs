@@ -1,20 +1,110 @@
-//! Where to raise the order: the energy's slope by functions that are not there yet.
+//! Where to raise the order: where the boundary is farthest from the target, or where the energy promises to fall.
 //!
-//! All orders are raised by one without moving anything; then `eta_e = 1/2 sum |g_i|^2 / d_i` over the new functions of an
-//! element, with the gradient g of the whole energy and the diagonal d of the model Hessian, predicts how much the energy
-//! would fall. A function shared by several elements counts in equal parts.
+//! By distance, the default: an element counts as far as the farthest of its boundary's samples is from the target, or the
+//! farthest of the target's vertices whose nearest point lies on it. Those beyond a share of the largest are raised. By
+//! energy: all orders are raised by one without moving anything; then `eta_e = 1/2 sum |g_i|^2 / d_i` over the new
+//! functions of an element, with the gradient g of the whole energy and the diagonal d of the model Hessian, predicts how
+//! much the energy would fall. A function shared by several elements counts in equal parts. The energy is a mean over the
+//! surface, so that this indicator leaves small places with a large distance alone.
 
 use super::fit::Fit;
-use super::settings::Adaptive;
+use super::settings::{Adaptive, Indicator};
 use super::surface_energy::SurfaceEnergy;
 use super::{invalid, quality};
 use crate::fem::boundary::Boundary;
 use crate::fem::space::Space;
+use crate::geometry::closest_point::{ClosestPoint, Nearest};
+use crate::mesh::TriangleMesh;
 use crate::method::Failure;
 use crate::method::volume_fit::preconditioner::{Model, diagonal};
+use rayon::prelude::*;
 
-/// Orders with those raised whose elements promise the given share of the fall; nothing when no order can be raised.
-pub(super) fn raised(fit: &Fit<'_>, adaptive: &Adaptive) -> Result<Option<Vec<usize>>, Failure> {
+/// Orders with those raised that the indicator chooses; nothing when no order can be raised.
+/// `history` is what the steps before had to show.
+pub(super) fn raised(
+    fit: &Fit<'_>,
+    adaptive: &Adaptive,
+    history: &mut Vec<f64>,
+) -> Result<Option<Vec<usize>>, Failure> {
+    match adaptive.indicator {
+        Indicator::Distance => Ok(raised_by_distance(fit, adaptive, history)),
+        Indicator::Energy => raised_by_energy(fit, adaptive),
+    }
+}
+
+/// Intervals along an edge, at least, when distances are measured.
+const FINE: usize = 12;
+/// Raising is in vain when the largest distance is not below this share of what it was so many steps before.
+const WORTHWHILE: f64 = 0.97;
+const PATIENCE: usize = 3;
+
+fn raised_by_distance(fit: &Fit<'_>, adaptive: &Adaptive, history: &mut Vec<f64>) -> Option<Vec<usize>> {
+    let orders = &fit.space.orders;
+    let highest = orders.iter().copied().max().unwrap_or(1);
+    let boundary = Boundary::new(&fit.volume, &fit.topology, &fit.space, FINE.max(2 * highest));
+    let mut samples = Vec::new();
+    boundary.positions(&fit.x, &mut samples);
+    let owners: Vec<usize> = fit
+        .topology
+        .boundary()
+        .map(|(_, face)| face.cells[0] as usize)
+        .collect();
+    let mut far = vec![0.0_f64; orders.len()];
+    let mut count = |triangle: u32, square: f64| {
+        let cell = owners[boundary.patch_of[triangle as usize] as usize];
+        far[cell] = far[cell].max(square.sqrt());
+    };
+    let nearest = |points: &[[f64; 3]], surface: &ClosestPoint| -> Vec<Nearest> {
+        points.par_iter().map(|&point| surface.nearest(point, None)).collect()
+    };
+    let target = &fit.target.surface;
+    if !target.cells.is_empty() {
+        let found = nearest(&samples, &ClosestPoint::new(target));
+        for (triangle, corners) in boundary.triangles.iter().enumerate() {
+            for &corner in corners {
+                count(triangle as u32, found[corner as usize].squared_distance);
+            }
+        }
+    }
+    let fitted = TriangleMesh {
+        points: samples,
+        cells: boundary.triangles.clone(),
+    };
+    let points = if target.cells.is_empty() {
+        &fit.target.sites
+    } else {
+        &target.points
+    };
+    for found in nearest(points, &ClosestPoint::new(&fitted)) {
+        count(found.triangle, found.squared_distance);
+    }
+    let most = orders
+        .iter()
+        .zip(&far)
+        .filter(|(order, _)| **order < adaptive.most)
+        .fold(0.0_f64, |most, (_, &far)| most.max(far));
+    // What the volume energy holds back no order brings nearer.
+    let before = history.len().checked_sub(PATIENCE).map(|place| history[place]);
+    history.push(far.iter().copied().fold(0.0, f64::max));
+    if let (Some(before), Some(&now)) = (before, history.last())
+        && now > WORTHWHILE * before
+    {
+        return None;
+    }
+    let chosen = |(&order, &far): (&usize, &f64)| {
+        if order < adaptive.most && far > 0.0 && far >= (1.0 - adaptive.share) * most {
+            order + 1
+        } else {
+            order
+        }
+    };
+    let mut result: Vec<usize> = orders.iter().zip(&far).map(chosen).collect();
+    smooth(fit, &mut result);
+    (result != *orders).then_some(result)
+}
+
+/// Raises those that together promise the given share of the fall.
+fn raised_by_energy(fit: &Fit<'_>, adaptive: &Adaptive) -> Result<Option<Vec<usize>>, Failure> {
     let settings = fit.settings;
     let orders = &fit.space.orders;
     let up: Vec<usize> = orders.iter().map(|&order| (order + 1).min(adaptive.most)).collect();
@@ -67,11 +157,13 @@ pub(super) fn raised(fit: &Fit<'_>, adaptive: &Adaptive) -> Result<Option<Vec<us
         boundary: &boundary,
         samples: &samples,
         lambda: fit.lambda,
-        size: fit.size,
+        x: &x,
+        references: &fit.references,
         volume: fit.reference_volume,
         surface: factor,
         anisotropy: settings.anisotropy,
-    });
+    })
+    .map_err(invalid)?;
     let mut sharers = vec![0.0; space.nodes];
     for cell in &space.cells {
         for (node, _) in cell.slots.iter().filter_map(|slot| slot.node()) {

@@ -4,11 +4,11 @@ use super::objective::Parts;
 use super::settings::{Settings, Stage};
 use super::shell::{self, Shell};
 use super::surface_energy::Scale;
-use super::target::Target;
+use super::target::{Closure, Target};
 use super::template::{Template, transform};
 use super::{COUNTERS, adaptivity, invalid, quality, subdivision, untangle, validity};
 use crate::energy::mapping::Density;
-use crate::fem::batches::{Batches, reference_volume, references_of_volume, unit_reference};
+use crate::fem::batches::{Batches, reference_volume, references_of_volume};
 use crate::fem::space::{Kind, Space};
 use crate::fem::volume_energy::VolumeEnergy;
 use crate::linalg::vector3::Columns;
@@ -27,8 +27,6 @@ pub(super) struct Fit<'a> {
     pub(super) shell: Option<Shell>,
     pub(super) references: Vec<Columns<f64>>,
     pub(super) reference_volume: f64,
-    /// Edge of the references.
-    pub(super) size: f64,
     pub(super) scale: Scale,
     /// The target's units: length of 1 here, and the middle.
     pub(super) unit: f64,
@@ -102,8 +100,8 @@ impl<'a> Fit<'a> {
                 "the template has the volume {own_volume:e}; its elements are inside out or flat"
             )));
         }
-        check_target(&target, &template_surface, &mut notices)?;
-        let scale = Scale::of(&target, &template_surface, own_volume);
+        let closed = check_target(&target, &template_surface, own_volume, shell.is_some(), &mut notices)?;
+        let scale = Scale::of(&target, closed, &template_surface, own_volume);
         let (references, whole) = match &shell {
             None => {
                 let shapes = volume.iter().map(|cell| cell.0);
@@ -117,10 +115,21 @@ impl<'a> Fit<'a> {
                 (shell.references.clone(), sum)
             }
         };
-        let unit_volume: f64 = volume
-            .iter()
-            .map(|(shape, _)| reference_volume(shape, &unit_reference(shape)))
-            .sum();
+        if settings.levels > 0 && (map.is_some() || shell.is_some()) {
+            return Err(invalid(
+                "a subdivision volume starts from straight hexahedra, not from a coefficient file or a shell; remove \
+                 `subdivision_levels`"
+                    .to_string(),
+            ));
+        }
+        if let Some(highest) = map.as_ref().and_then(|map| map.orders.iter().max())
+            && *highest > settings.order
+        {
+            notices.push(format!(
+                "the template's elements have orders up to {highest}, above the order {} of the job: they keep them",
+                settings.order
+            ));
+        }
         let first = settings.stages[0].order;
         let (space, x) = match map {
             None => {
@@ -144,7 +153,6 @@ impl<'a> Fit<'a> {
         };
         Ok(Fit {
             settings,
-            size: (whole / unit_volume).cbrt(),
             reference_volume: whole,
             shell,
             volume,
@@ -253,19 +261,26 @@ impl<'a> Fit<'a> {
         if let Some(adaptive) = self.settings.adaptive
             && !interrupted(stop)
         {
+            let last = self.settings.stages[self.settings.stages.len() - 1];
+            let mut history = Vec::new();
             for _ in 0..adaptive.steps {
-                let Some(orders) = adaptivity::raised(self, &adaptive)? else {
+                let Some(orders) = adaptivity::raised(self, &adaptive, &mut history)? else {
                     break;
                 };
                 self.raise(&orders)?;
                 let stage = Stage {
                     order: orders.iter().copied().max().unwrap_or(1),
-                    ..self.settings.stages[self.settings.stages.len() - 1]
+                    tolerance: self.settings.coarse_tolerance,
+                    ..last
                 };
                 (stop, reason) = self.stage(&stage, observer)?;
                 if interrupted(stop) {
                     break;
                 }
+            }
+            if !interrupted(stop) {
+                let order = self.space.orders.iter().copied().max().unwrap_or(1);
+                (stop, reason) = self.stage(&Stage { order, ..last }, observer)?;
             }
         }
         for _ in 0..self.settings.repairs {
@@ -283,6 +298,7 @@ impl<'a> Fit<'a> {
                 self.certificates = Some(certificates);
                 break;
             }
+            observer.phase("repair");
             self.extra_points += 3;
             self.notices.push(format!(
                 "{failing} elements were invalid between quadrature points; gone on with {} more a direction",
@@ -308,45 +324,50 @@ pub(super) fn interrupted(stop: StopReason) -> bool {
     )
 }
 
-/// Names what is wrong with a target surface; an inside-out one is turned, an open or damaged one only mentioned.
-fn check_target(target: &Target, template: &TriangleMesh, notices: &mut Vec<String>) -> Result<(), Failure> {
+/// Names what is wrong with a target surface, and says whether it encloses a volume. An inside-out one does.
+fn check_target(
+    target: &Target,
+    template: &TriangleMesh,
+    template_volume: f64,
+    is_shell: bool,
+    notices: &mut Vec<String>,
+) -> Result<bool, Failure> {
     if target.surface.cells.is_empty() {
         notices.push(format!(
-            "the target is a cloud of {} points without normals",
+            "the target is a cloud of {} points without normals: only the term from the template to the points is there",
             target.sites.len()
         ));
-        return Ok(());
+        return Ok(false);
     }
     if target.sites.is_empty() {
         return Err(invalid("every triangle of the target has no area".to_string()));
     }
-    let mut sides = BTreeMap::<[u32; 2], [usize; 2]>::new();
-    for cell in &target.surface.cells {
-        for place in 0..3 {
-            let (a, b) = (cell[place], cell[(place + 1) % 3]);
-            sides.entry([a.min(b), a.max(b)]).or_default()[usize::from(a > b)] += 1;
-        }
-    }
-    let open = sides.values().filter(|count| count[0] + count[1] == 1).count();
-    if open > 0 {
+    let closure = Closure::of(&target.surface);
+    let volume = target.surface.enclosed_volume();
+    if !closure.is_closed() {
         notices.push(format!(
-            "the target is open or a soup: {open} of its {} edges have one triangle; volume and length scale are the \
-             template's where its own make no sense",
-            sides.len()
+            "the target does not enclose a volume: of its {} edges {} have one triangle and {} have triangles of opposite \
+             orientations; the length scale is from the template's volume {template_volume:.4}, not {volume:.4} (in units of \
+             the box's diagonal)",
+            closure.edges, closure.open, closure.turned
         ));
-    } else {
-        if target.surface.enclosed_volume() < 0.0 {
-            notices.push("the target is inside out; distances do not depend on it".to_string());
-        }
-        let [wanted, given] = [&target.surface, template].map(euler_characteristic);
-        if wanted != given {
-            notices.push(format!(
-                "the template's boundary has the Euler characteristic {given}, the target {wanted}: as they differ in holes or \
-                 pieces, no fit is one-to-one; carve the template accordingly"
-            ));
-        }
+        return Ok(false);
     }
-    Ok(())
+    // A shell has two surfaces, and is turned when it is grown.
+    if is_shell {
+        return Ok(true);
+    }
+    if volume < 0.0 {
+        notices.push("the target is inside out; distances do not depend on it".to_string());
+    }
+    let [wanted, given] = [&closure.joined, template].map(euler_characteristic);
+    if wanted != given {
+        notices.push(format!(
+            "the template's boundary has the Euler characteristic {given}, the target {wanted}: as they differ in holes or \
+             pieces, no fit is one-to-one; carve the template accordingly"
+        ));
+    }
+    Ok(true)
 }
 
 /// Vertices less edges plus triangles, without points that no triangle uses.

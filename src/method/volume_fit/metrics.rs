@@ -10,7 +10,7 @@ pub static ALL: &[Metric] = &[
         "",
         None,
         Better::Higher,
-        "Mean over 1000 points in every element of the scaled Jacobian: the least over the corner frames of the ideal element, \
+        "Mean over 1000 evenly spread points in every element of the scaled Jacobian: the least over the corner frames of the ideal element, \
          carried along by the map, of determinant over product of lengths, 1 for the ideal element (Jin et al. 2013, table 1).",
     ),
     metric(
@@ -19,7 +19,7 @@ pub static ALL: &[Metric] = &[
         "",
         None,
         Better::Higher,
-        "Least of these scaled Jacobians.",
+        "Least scaled Jacobian at these points and on a lattice of ten intervals a side, faces, edges and corners included.",
     ),
     metric(
         "inverted",
@@ -27,8 +27,7 @@ pub static ALL: &[Metric] = &[
         "",
         Some(0.0),
         Better::Lower,
-        "Elements with a determinant that is not positive at one of these points, at a quadrature point, or where the \
-         certificate found one.",
+        "Elements with a determinant that is not positive at one of these points, or where the certificate found one.",
     ),
     metric(
         "min_determinant",
@@ -251,6 +250,6 @@ pub static ALL: &[Metric] = &[
         "",
         None,
         Better::Neither,
-        "Elements of the template with a determinant that is not positive at a quadrature point.",
+        "Elements of the template with a determinant that is not positive at one of these points.",
     ),
 ];

@@ -51,7 +51,7 @@ impl Method for VolumeFit {
     }
 
     fn version(&self) -> u32 {
-        2
+        3
     }
 
     fn summary(&self) -> &'static str {
@@ -101,10 +101,28 @@ impl Method for VolumeFit {
             None => {
                 let template = template::read(template_part, None, &mut notices)?;
                 let topology = template.mesh.topology().map_err(invalid)?;
-                let target = target::of_boundary(topology.boundary_triangles(&template.mesh.points));
+                let target = target::of_boundary(template.boundary(&topology).map_err(invalid)?);
                 (template, target)
             }
         };
+        let kinds: [(bool, &str, &[&str]); 2] = [
+            (template.shell.is_some(), "a shell", settings::WITHOUT_EFFECT_ON_SHELLS),
+            (
+                settings.levels > 0,
+                "a subdivision volume",
+                settings::WITHOUT_EFFECT_ON_SUBDIVISIONS,
+            ),
+        ];
+        for (_, kind, fields) in kinds.iter().filter(|kind| kind.0) {
+            let given: Vec<&str> = fields
+                .iter()
+                .copied()
+                .filter(|field| inputs.settings.get(field).is_some())
+                .collect();
+            if !given.is_empty() {
+                notices.push(format!("{} without effect on {kind}", given.join(", ")));
+            }
+        }
         let mut fit = Fit::new(template, target, &settings, notices)?;
         fit.run(observer)
     }

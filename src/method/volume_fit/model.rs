@@ -12,15 +12,16 @@ const COORDINATE: Kind = Kind::Number { min: -1e9, max: 1e9 };
 static OPERATION: &[Field] = &[
     Field {
         name: "op",
+        // First the one that needs no box.
         kind: Kind::Choice(&[
+            (
+                "pillow",
+                "put a layer of cells around the whole boundary, inside the old one",
+            ),
             ("carve", "remove the cells whose centroid lies in the box"),
             (
                 "extrude",
                 "put layers of cells on the boundary faces whose centroid lies in the box",
-            ),
-            (
-                "pillow",
-                "put a layer of cells around the whole boundary, inside the old one",
             ),
             (
                 "collapse",
@@ -74,7 +75,11 @@ static RECIPE: Field = Field {
     name: "recipe",
     kind: Kind::List(&OPERATIONS),
     default: Default::Absent,
-    doc: "Operations on the template, one after the other: `recipe = [{ op = \"carve\", from = [1, 1, 0], to = [2, 2, 3] }]`.",
+    doc: "Operations on the template, one after the other: `{ op = \"carve\", from = [1, 1, 0], to = [2, 2, 3] }` removes cells in \
+          a box, `{ op = \"extrude\", from, to, distance = 1.0, layers = 1 }` grows layers on boundary faces there, \
+          `{ op = \"pillow\", thickness = 0.4 }` puts a layer of cells inside the whole boundary, `{ op = \"collapse\", axis = \"x\", \
+          from, to }` collapses edges, which turns hexahedra into prisms and prisms into tetrahedra. Boxes are in the template's \
+          own coordinates, where a grid's cells are unit cubes.",
 };
 
 static PLACE: Field = Field {

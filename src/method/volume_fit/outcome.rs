@@ -7,6 +7,9 @@ use crate::method::{Failure, Outcome, Traces};
 use crate::optimize::{Observer, StopReason};
 use std::collections::BTreeMap;
 
+/// Distances from here on, in per cent of the diagonal, are told.
+const POOR: f64 = 3.0;
+
 impl Fit<'_> {
     pub(super) fn finish(
         &mut self,
@@ -89,6 +92,13 @@ impl Fit<'_> {
         set("stages", self.stages as f64);
         set("inverted_at_start", inverted_at_start as f64);
         self.notices.extend(certificates.notices);
+        let hausdorff = metrics["hausdorff"];
+        if hausdorff > POOR && self.shell.is_none() {
+            self.notices.push(format!(
+                "the fitted boundary and the target are up to {hausdorff:.1} % of the diagonal apart; raise the order or \
+                 iteration_limit, or use more elements"
+            ));
+        }
         let given: Vec<f64> = self
             .x
             .chunks_exact(3)

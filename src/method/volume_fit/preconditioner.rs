@@ -1,17 +1,21 @@
-//! A constant positive definite model of the Hessian: stiffness of the reference cells, and the mass of the boundary along
-//! its normals.
+//! A positive definite model of the Hessian, constant from one refreshment to the next: stiffness of the cells as they are,
+//! and the mass of the boundary along its normals.
 //!
-//! The volume energy bends like `lambda / |Omega| int |grad u|^2`, the surface energy like `4 / (A L^2) int (n . u)^2`, and
-//! a share `1 / s^2` of it along the surface. Functions up to some order are factorized together, those above are divided
+//! The volume energy is one of logarithmic strains, or grows like one, so that it bends like
+//! `lambda / |Omega| int |grad_x u|^2 dX`: gradients by the place in space, volume of the reference. A cell that is crushed
+//! to a share c of its thickness is 1 / c^2 times as stiff. With the mean over the cell of the metric
+//! `G = J^-1 J^-T` in canonical coordinates that is `sum_ij G_ij int dN_a/du_i dN_b/du_j`. The surface energy bends like
+//! `4 / (A L^2) int (n . u)^2`, and a share `1 / s^2` of it along the surface. Functions up to some order are factorized together, those above are divided
 //! by their diagonal: hierarchical bases are nearly orthogonal between orders.
 
-use crate::fem::batches::unit_reference;
+use crate::fem::batches::{Batches, in_frame};
 use crate::fem::boundary::Boundary;
 use crate::fem::functions::cell_table;
 use crate::fem::quadrature::Rule;
 use crate::fem::space::{Kind, Slot, Space};
+use crate::linalg::processor::Processor;
 use crate::linalg::sparse::{BlockCholesky, BlockPattern};
-use crate::linalg::vector3::{Columns, apply, cofactor, dot, times};
+use crate::linalg::vector3::{Columns, add as plus, cofactor, dot, times};
 use crate::mesh::mixed::{MixedMesh, Topology};
 use crate::mesh::{area_vector, length};
 use std::collections::BTreeMap;
@@ -37,9 +41,10 @@ pub struct Model<'a> {
     pub boundary: &'a Boundary,
     /// Samples and triangles of the boundary as they are now.
     pub samples: &'a [[f64; 3]],
+    /// The nodes as they are now.
+    pub x: &'a [f64],
+    pub references: &'a [Columns<f64>],
     pub lambda: f64,
-    /// Edge of the references.
-    pub size: f64,
     /// Volume of all references.
     pub volume: f64,
     /// Weight of the squared normal displacement in the surface energy.
@@ -79,20 +84,23 @@ impl Preconditioner {
             let key = ((a.min(b) as u64) << 32) | a.max(b) as u64;
             entries.push((key, block));
         };
-        let bulk = model.lambda / model.volume * model.size;
-        let mut kinds: BTreeMap<Kind, Vec<f64>> = BTreeMap::new();
-        for cell in &low.cells {
+        let metrics = metrics(model)?;
+        let mut kinds: BTreeMap<Kind, [Vec<f64>; 6]> = BTreeMap::new();
+        for (cell, metric) in low.cells.iter().zip(&metrics) {
             let stiffness = kinds.entry(cell.kind).or_insert_with(|| stiffness(&low, cell.kind));
             let count = cell.slots.len();
+            let largest = (0..count)
+                .map(|i| contract(stiffness, metric, i * count + i))
+                .fold(0.0, f64::max);
             for (i, a) in cell.slots.iter().enumerate() {
                 let Some((node, sign)) = a.node() else { continue };
                 for (j, b) in cell.slots.iter().enumerate().skip(i) {
-                    let value = stiffness[i * count + j];
-                    if value == 0.0 {
+                    let value = contract(stiffness, metric, i * count + j);
+                    if value.abs() <= NEGLIGIBLE * largest {
                         continue;
                     }
                     let Some((other, turn)) = b.node() else { continue };
-                    let value = bulk * sign * turn * value;
+                    let value = sign * turn * value;
                     add(node, other, [value, 0.0, 0.0, value, 0.0, value]);
                 }
             }
@@ -197,7 +205,7 @@ impl Preconditioner {
 
         let mut inverse = vec![0.0; space.nodes];
         if space.nodes > low.nodes {
-            for (inverse, value) in inverse.iter_mut().zip(diagonal(model)) {
+            for (inverse, value) in inverse.iter_mut().zip(diagonal_with(model, &metrics)?) {
                 *inverse = 1.0 / value.max(f64::MIN_POSITIVE);
             }
             for &node in &nodes {
@@ -231,74 +239,138 @@ impl Preconditioner {
     }
 }
 
-/// Inverse transposed of the unit reference, and its determinant.
-fn unit_inverse(kind: Kind) -> (Columns<f64>, f64) {
-    let reference = unit_reference(kind.shape);
-    let cof = cofactor(&reference);
-    let determinant = dot(reference[0], cof[0]);
-    (cof.map(|column| times(column, 1.0 / determinant)), determinant)
+/// Couplings below this share of a cell's largest are left out.
+const NEGLIGIBLE: f64 = 1e-11;
+
+/// Points a direction over which the metric is averaged, ends included: cells are crushed at corners first.
+const POINTS: usize = 4;
+
+/// A cell counts as crushed to this share of its thickness at most, or nothing would move it any more.
+const THINNEST: f64 = 0.01;
+
+/// The six entries of a symmetric matrix, 00 01 02 11 12 22.
+const ENTRIES: [[usize; 2]; 6] = [[0, 0], [0, 1], [0, 2], [1, 1], [1, 2], [2, 2]];
+
+/// Weighted mean of `J^-1 J^-T` of every cell, in canonical coordinates.
+fn metrics(model: &Model<'_>) -> Result<Vec<[f64; 6]>, String> {
+    let space = model.space;
+    let batches = Batches::new(space, model.references, &|kind| Rule::Lobatto.cell(kind.shape, POINTS))?;
+    let processor = Processor::detect();
+    let inverses: Vec<(Columns<f64>, f64)> = space
+        .cells
+        .iter()
+        .zip(model.references)
+        .map(|(cell, reference)| {
+            let framed = in_frame(cell.kind.shape, &cell.corners, reference);
+            let cof = cofactor(&framed);
+            let determinant = dot(framed[0], cof[0]);
+            // Row r of the inverse is cof[r] / det.
+            (cof.map(|row| times(row, 1.0 / determinant)), determinant.abs())
+        })
+        .collect();
+    let mut sums = vec![([0.0; 6], 0.0); space.cells.len()];
+    for place in batches.list() {
+        batches.visit(processor, place, model.x, |cell, _, jacobian| {
+            // Rows of the deformation's inverse, held down where a point is crushed.
+            let cof = cofactor(&jacobian);
+            let determinant = dot(jacobian[0], cof[0]);
+            let size = cof.iter().map(|row| dot(*row, *row)).sum::<f64>().sqrt();
+            let factor = 1.0 / determinant.abs().max(THINNEST * size);
+            // J^-1 of the canonical map is the inverse reference times that of the deformation.
+            let rows = cof.map(|row| times(row, factor));
+            let inverse = &inverses[cell].0;
+            let product = inverse.map(|row| {
+                let parts = [0, 1, 2].map(|k| times(rows[k], row[k]));
+                plus(plus(parts[0], parts[1]), parts[2])
+            });
+            let (sum, count) = &mut sums[cell];
+            for (sum, [i, j]) in sum.iter_mut().zip(ENTRIES) {
+                *sum += dot(product[i], product[j]);
+            }
+            *count += 1.0;
+        });
+    }
+    let bulk = model.lambda / model.volume;
+    let scaled = sums.iter().zip(&inverses).map(|((sum, count), (_, determinant))| {
+        let factor = bulk * determinant / f64::max(*count, 1.0);
+        sum.map(|entry| factor * entry)
+    });
+    Ok(scaled.collect())
 }
 
-/// Gradients of the local functions in the unit reference at quadrature points, and the weights.
+/// `sum_ij G_ij S_ij` at one place of the six matrices.
+fn contract(parts: &[Vec<f64>; 6], metric: &[f64; 6], place: usize) -> f64 {
+    let mut sum = 0.0;
+    for (entry, [i, j]) in ENTRIES.into_iter().enumerate() {
+        // What stands off the diagonal stands there twice; the parts are symmetrized.
+        sum += if i == j { 1.0 } else { 2.0 } * metric[entry] * parts[entry][place];
+    }
+    sum
+}
+
+/// Derivatives of the local functions by canonical coordinates at quadrature points, and the weights.
 fn gradients(space: &Space, kind: Kind) -> (Vec<[f64; 3]>, Vec<f64>) {
     let quadrature = Rule::Gauss.cell(kind.shape, kind.order + 2);
     let table = cell_table(space.basis, kind, &quadrature);
-    let (inverse, determinant) = unit_inverse(kind);
     let [u, v, w] = &table.derivatives;
-    let gradients = (0..u.len()).map(|place| apply(&inverse, [u[place], v[place], w[place]]));
-    let weights = quadrature.nodes().iter().map(|node| node.1 * determinant).collect();
+    let gradients = (0..u.len()).map(|place| [u[place], v[place], w[place]]);
+    let weights = quadrature.nodes().iter().map(|node| node.1).collect();
     (gradients.collect(), weights)
 }
 
-/// `int grad N_a . grad N_b` over the unit reference; what is zero but for rounding is zero.
-fn stiffness(space: &Space, kind: Kind) -> Vec<f64> {
+/// `int (dN_a/du_i dN_b/du_j + dN_a/du_j dN_b/du_i) / 2` over the canonical cell, for `a <= b`.
+fn stiffness(space: &Space, kind: Kind) -> [Vec<f64>; 6] {
     let (gradients, weights) = gradients(space, kind);
     let count = kind.functions();
-    let mut result = vec![0.0; count * count];
+    let mut result: [Vec<f64>; 6] = std::array::from_fn(|_| vec![0.0; count * count]);
     for (point, &weight) in weights.iter().enumerate() {
         let row = &gradients[point * count..(point + 1) * count];
-        for i in 0..count {
-            let scaled = times(row[i], weight);
-            for j in i..count {
-                result[i * count + j] += dot(scaled, row[j]);
+        for a in 0..count {
+            let scaled = times(row[a], 0.5 * weight);
+            for b in a..count {
+                for (part, [i, j]) in result.iter_mut().zip(ENTRIES) {
+                    part[a * count + b] += scaled[i] * row[b][j] + scaled[j] * row[b][i];
+                }
             }
-        }
-    }
-    let largest = result.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
-    for value in &mut result {
-        if value.abs() < 1e-11 * largest {
-            *value = 0.0;
         }
     }
     result
 }
 
-/// The diagonal of [`stiffness`].
-fn stiffness_diagonal(space: &Space, kind: Kind) -> Vec<f64> {
+/// The diagonals of [`stiffness`].
+fn stiffness_diagonal(space: &Space, kind: Kind) -> [Vec<f64>; 6] {
     let (gradients, weights) = gradients(space, kind);
     let count = kind.functions();
-    let mut result = vec![0.0; count];
+    let mut result: [Vec<f64>; 6] = std::array::from_fn(|_| vec![0.0; count]);
     for (point, &weight) in weights.iter().enumerate() {
-        for (sum, &gradient) in result.iter_mut().zip(&gradients[point * count..]) {
-            *sum += weight * dot(gradient, gradient);
+        for (place, &gradient) in gradients[point * count..(point + 1) * count].iter().enumerate() {
+            for (part, [i, j]) in result.iter_mut().zip(ENTRIES) {
+                part[place] += weight * gradient[i] * gradient[j];
+            }
         }
     }
     result
 }
 
 /// The diagonal of the model, a number a node.
-pub fn diagonal(model: &Model<'_>) -> Vec<f64> {
+///
+/// # Errors
+/// When the reference of a cell is flat.
+pub fn diagonal(model: &Model<'_>) -> Result<Vec<f64>, String> {
+    diagonal_with(model, &metrics(model)?)
+}
+
+fn diagonal_with(model: &Model<'_>, metrics: &[[f64; 6]]) -> Result<Vec<f64>, String> {
     let space = model.space;
-    let bulk = model.lambda / model.volume * model.size;
     let mut diagonal = vec![0.0; space.nodes];
-    let mut kinds: BTreeMap<Kind, Vec<f64>> = BTreeMap::new();
-    for cell in &space.cells {
+    let mut kinds: BTreeMap<Kind, [Vec<f64>; 6]> = BTreeMap::new();
+    for (cell, metric) in space.cells.iter().zip(metrics) {
         let own = kinds
             .entry(cell.kind)
             .or_insert_with(|| stiffness_diagonal(space, cell.kind));
-        for (slot, value) in cell.slots.iter().zip(own.iter()) {
+        for (place, slot) in cell.slots.iter().enumerate() {
             if let Some((node, _)) = slot.node() {
-                diagonal[node] += bulk * value;
+                diagonal[node] += contract(own, metric, place);
             }
         }
     }
@@ -314,7 +386,7 @@ pub fn diagonal(model: &Model<'_>) -> Vec<f64> {
             }
         });
     }
-    diagonal
+    Ok(diagonal)
 }
 
 /// How the surface energy bends by every sample: `n n^T` and a share of the rest, times the sample's area.

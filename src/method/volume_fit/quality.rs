@@ -1,9 +1,12 @@
-//! How good the elements are: scaled Jacobians and determinants at a thousand points of each.
+//! How good the elements are: scaled Jacobians and determinants.
+//!
+//! Means are taken over a thousand points spread evenly over the canonical cell, extremes over these and a lattice with the
+//! corners, edges and faces, where elements fail first.
 
 use super::invalid;
 use crate::fem::batches::{Batches, unit_reference};
-use crate::fem::quadrature::{CellQuadrature, Line, Scattered};
-use crate::fem::space::Space;
+use crate::fem::quadrature::{CellQuadrature, Line, Rule, Scattered};
+use crate::fem::space::{Kind, Space};
 use crate::linalg::processor::Processor;
 use crate::linalg::vector3::{Columns, apply, cofactor, dot};
 use crate::mesh;
@@ -12,7 +15,7 @@ use crate::method::Failure;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
-/// Points a direction at which elements are judged: a thousand an element.
+/// Points a direction over which means are taken: a thousand an element.
 const SAMPLES: usize = 10;
 
 /// Figures of every element.
@@ -26,57 +29,50 @@ pub struct Quality {
     pub spread: f64,
 }
 
-/// A thousand points that are random along each direction, with the ends among them.
-fn random_points(shape: Shape) -> CellQuadrature {
-    // Van der Corput numbers in coprime bases: as good as random, and the same on every machine.
-    let radical = |mut index: usize, base: usize| {
-        let (mut value, mut share) = (0.0, 1.0);
-        while index > 0 {
-            share /= base as f64;
-            value += share * (index % base) as f64;
-            index /= base;
-        }
-        value
-    };
-    let mut line: Vec<f64> = (1..SAMPLES - 1).map(|k| radical(k, 2)).collect();
-    line.push(0.0);
-    line.push(1.0);
+/// A thousand points that share the cell's volume evenly.
+fn even_points(shape: Shape) -> CellQuadrature {
     let even = |count: usize| vec![1.0 / count as f64; count];
-    let fold = |mut u: f64, mut v: f64| {
-        if u + v > 1.0 {
-            (u, v) = (1.0 - u, 1.0 - v);
-        }
-        [u, v]
+    let middle = |k: usize| (k as f64 + 0.5) / SAMPLES as f64;
+    let line = || Line {
+        points: (0..SAMPLES).map(middle).collect(),
+        weights: even(SAMPLES),
     };
     match shape {
-        Shape::Hexahedron => CellQuadrature::Hexahedron(Line {
-            weights: even(line.len()),
-            points: line,
-        }),
+        Shape::Hexahedron => CellQuadrature::Hexahedron(line()),
         Shape::Prism => {
-            let mut points = vec![[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]];
-            points.extend((1..98).map(|k| fold(radical(k, 2), radical(k, 3))));
-            CellQuadrature::Prism(
-                Scattered {
-                    weights: even(points.len()),
-                    points,
-                },
-                Line {
-                    weights: even(line.len()),
-                    points: line,
-                },
-            )
-        }
-        Shape::Tetrahedron => {
-            let mut points = vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-            let mut index = 1;
-            while points.len() < SAMPLES.pow(3) {
-                let point = [radical(index, 2), radical(index, 3), radical(index, 5)];
-                index += 1;
-                if point.iter().sum::<f64>() <= 1.0 {
-                    points.push(point);
+            // The middles of the hundred small triangles.
+            let mut points = Vec::new();
+            for i in 0..SAMPLES {
+                for j in 0..SAMPLES - i {
+                    let at = |share: f64| [i, j].map(|index| (index as f64 + share) / SAMPLES as f64);
+                    points.push(at(1.0 / 3.0));
+                    if i + j + 1 < SAMPLES {
+                        points.push(at(2.0 / 3.0));
+                    }
                 }
             }
+            let triangle = Scattered {
+                weights: even(points.len()),
+                points,
+            };
+            CellQuadrature::Prism(triangle, line())
+        }
+        Shape::Tetrahedron => {
+            // Halton's points: as even as random ones or more so, and the same on every machine.
+            let radical = |mut index: usize, base: usize| {
+                let (mut value, mut share) = (0.0, 1.0);
+                while index > 0 {
+                    share /= base as f64;
+                    value += share * (index % base) as f64;
+                    index /= base;
+                }
+                value
+            };
+            let points: Vec<[f64; 3]> = (1..)
+                .map(|index| [2, 3, 5].map(|base| radical(index, base)))
+                .filter(|point| point.iter().sum::<f64>() <= 1.0)
+                .take(SAMPLES.pow(3))
+                .collect();
             CellQuadrature::Tetrahedron(Scattered {
                 weights: even(points.len()),
                 points,
@@ -105,17 +101,79 @@ fn corner_frames(shape: Shape) -> Vec<Columns<f64>> {
     frames
 }
 
+/// The lower of two numbers, not-a-number if one is: a determinant that is none must not pass for a good one.
+fn lower(a: f64, b: f64) -> f64 {
+    if a.is_nan() || a < b { a } else { b }
+}
+
 /// Judges every element at many points.
 pub fn quality(space: &Space, references: &[Columns<f64>], x: &[f64]) -> Result<Quality, Failure> {
-    let batches = Batches::new(space, references, &|kind| random_points(kind.shape)).map_err(invalid)?;
+    let inside = figures(space, references, x, &|kind| even_points(kind.shape))?;
+    let lattice = figures(space, references, x, &|kind| {
+        Rule::Trapezoid.cell(kind.shape, SAMPLES + 1)
+    })?;
+    let mut result = Quality::default();
+    let mut sums = [0.0; 3];
+    for (inside, lattice) in inside.iter().zip(&lattice) {
+        result.scaled_jacobian_mean.push(inside.scaled_jacobian / inside.points);
+        result
+            .scaled_jacobian_min
+            .push(lower(inside.least_scaled_jacobian, lattice.least_scaled_jacobian));
+        result
+            .least_determinant
+            .push(lower(inside.least_determinant, lattice.least_determinant));
+        result
+            .largest_determinant
+            .push(inside.largest_determinant.max(lattice.largest_determinant));
+        for (sum, value) in sums
+            .iter_mut()
+            .zip([inside.points, inside.logarithm, inside.squared_logarithm])
+        {
+            *sum += value;
+        }
+    }
+    let mean = sums[1] / sums[0];
+    result.spread = (sums[2] / sums[0] - mean * mean).max(0.0).sqrt();
+    Ok(result)
+}
+
+/// Sums and extremes over the points of one element.
+#[derive(Clone, Copy, Debug)]
+struct Figures {
+    points: f64,
+    scaled_jacobian: f64,
+    least_scaled_jacobian: f64,
+    least_determinant: f64,
+    largest_determinant: f64,
+    /// Of positive determinants.
+    logarithm: f64,
+    squared_logarithm: f64,
+}
+
+/// The figures of every element over the points of a quadrature.
+fn figures(
+    space: &Space,
+    references: &[Columns<f64>],
+    x: &[f64],
+    points: &dyn Fn(Kind) -> CellQuadrature,
+) -> Result<Vec<Figures>, Failure> {
+    let batches = Batches::new(space, references, points).map_err(invalid)?;
     let frames = Shape::ALL.map(corner_frames);
     let processor = Processor::detect();
-    let cells = space.cells.len();
-    let parts: Vec<BTreeMap<usize, [f64; 7]>> = batches
+    let none = Figures {
+        points: 0.0,
+        scaled_jacobian: 0.0,
+        least_scaled_jacobian: f64::INFINITY,
+        least_determinant: f64::INFINITY,
+        largest_determinant: f64::NEG_INFINITY,
+        logarithm: 0.0,
+        squared_logarithm: 0.0,
+    };
+    let parts: Vec<BTreeMap<usize, Figures>> = batches
         .list()
         .into_par_iter()
         .map(|place| {
-            let mut sums: BTreeMap<usize, [f64; 7]> = BTreeMap::new();
+            let mut sums: BTreeMap<usize, Figures> = BTreeMap::new();
             batches.visit(processor, place, x, |cell, _, jacobian| {
                 let frames = &frames[space.cells[cell].kind.shape as usize];
                 let determinant = dot(jacobian[0], cofactor(&jacobian)[0]);
@@ -124,43 +182,26 @@ pub fn quality(space: &Space, references: &[Columns<f64>], x: &[f64]) -> Result<
                     let image = frame.map(|edge| apply(&jacobian, edge));
                     let product: f64 = image.iter().map(|edge| mesh::length(*edge)).product();
                     // The images' determinant over that of the frame is the map's own.
-                    least = least.min(determinant / product.max(f64::MIN_POSITIVE));
+                    least = lower(least, determinant / product.max(f64::MIN_POSITIVE));
                 }
-                let entry =
-                    sums.entry(cell)
-                        .or_insert([0.0, 0.0, f64::INFINITY, f64::INFINITY, f64::NEG_INFINITY, 0.0, 0.0]);
-                entry[0] += 1.0;
-                entry[1] += least;
-                entry[2] = entry[2].min(least);
-                entry[3] = entry[3].min(determinant);
-                entry[4] = entry[4].max(determinant);
+                let entry = sums.entry(cell).or_insert(none);
+                entry.points += 1.0;
+                entry.scaled_jacobian += least;
+                entry.least_scaled_jacobian = lower(entry.least_scaled_jacobian, least);
+                entry.least_determinant = lower(entry.least_determinant, determinant);
+                entry.largest_determinant = entry.largest_determinant.max(determinant);
                 if determinant > 0.0 {
                     let logarithm = determinant.ln();
-                    entry[5] += logarithm;
-                    entry[6] += logarithm * logarithm;
+                    entry.logarithm += logarithm;
+                    entry.squared_logarithm += logarithm * logarithm;
                 }
             });
             sums
         })
         .collect();
-    let mut result = Quality {
-        scaled_jacobian_mean: vec![f64::NAN; cells],
-        scaled_jacobian_min: vec![f64::NAN; cells],
-        least_determinant: vec![f64::NAN; cells],
-        largest_determinant: vec![f64::NAN; cells],
-        spread: 0.0,
-    };
-    let mut sums = [0.0; 3];
+    let mut result = vec![none; space.cells.len()];
     for (cell, entry) in parts.into_iter().flatten() {
-        result.scaled_jacobian_mean[cell] = entry[1] / entry[0];
-        result.scaled_jacobian_min[cell] = entry[2];
-        result.least_determinant[cell] = entry[3];
-        result.largest_determinant[cell] = entry[4];
-        for (sum, value) in sums.iter_mut().zip([entry[0], entry[5], entry[6]]) {
-            *sum += value;
-        }
+        result[cell] = entry;
     }
-    let mean = sums[1] / sums[0];
-    result.spread = (sums[2] / sums[0] - mean * mean).max(0.0).sqrt();
     Ok(result)
 }

@@ -63,7 +63,10 @@ pub static FIELDS: &[Field] = &[
     Field {
         name: "preset",
         kind: Kind::Choice(&[
-            ("best", "integrated Legendre, Lobatto quadrature, preconditioned L-BFGS"),
+            (
+                "best",
+                "integrated Legendre, Lobatto quadrature, preconditioned L-BFGS, a far phase in steps",
+            ),
             (
                 "paper",
                 "integrated Fourier, trapezoid rule, plain L-BFGS until the gradient norm is 1e-8",
@@ -92,20 +95,21 @@ pub static FIELDS: &[Field] = &[
         name: "lambda_far",
         kind: Kind::Number { min: 0.0, max: 1e9 },
         default: Default::Absent,
-        doc: "Weight of the volume energy in the far phase; 0 leaves the far phase out. Preset best: 0, because a template in \
-              the target's box is near enough and a stiff phase bends thin layers; paper: 50.",
+        doc: "Weight of the volume energy in the far phase, which brings a template that is far away near as a whole, where the \
+              close phase would crush its outer layer; 0 leaves the far phase out. 50 when absent.",
     },
     Field {
         name: "lambda",
         kind: Kind::Number { min: 1e-9, max: 1e9 },
         default: Default::Number(0.05),
-        doc: "Weight of the volume energy in the close phase.",
+        doc: "Weight of the volume energy in the close phase. It costs distance: where orders no longer bring the boundary nearer, \
+              a smaller one does, or a finer target.",
     },
     Field {
         name: "far_steps",
         kind: Kind::Integer { min: 1, max: 50 },
-        default: Default::Integer(1),
-        doc: "Stages of the far phase: 1 keeps lambda_far; more go down to lambda in geometric steps.",
+        default: Default::Absent,
+        doc: "Stages of the far phase: 1 keeps lambda_far; more go down to lambda in geometric steps. Preset best: 3, paper: 1.",
     },
     Field {
         name: "schedule",
@@ -117,13 +121,26 @@ pub static FIELDS: &[Field] = &[
         name: "adaptive",
         kind: Kind::Boolean,
         default: Default::Boolean(false),
-        doc: "Raise the order of single elements where the energy would fall most, instead of all alike, up to `order`.",
+        doc: "Raise the order of single elements where it is needed most, instead of all alike, up to `order`.",
+    },
+    Field {
+        name: "adaptive_indicator",
+        kind: Kind::Choice(&[
+            ("distance", "where an element's boundary is farthest from the target"),
+            (
+                "energy",
+                "where the energy promises to fall most (its gradient by functions that are not there yet)",
+            ),
+        ]),
+        default: Default::Text("distance"),
+        doc: "Which elements are raised.",
     },
     Field {
         name: "adaptive_share",
         kind: Kind::Number { min: 0.01, max: 1.0 },
         default: Default::Number(0.5),
-        doc: "Share of the indicator that the elements chosen in a step must have together (Doerfler).",
+        doc: "By energy, the share of the indicator that the elements chosen in a step must have together (Doerfler); by \
+              distance, those are chosen whose distance is at least the largest less this share.",
     },
     Field {
         name: "adaptive_steps",
@@ -241,6 +258,13 @@ pub static FIELDS: &[Field] = &[
         doc: "A stage has converged when an iteration lowers the energy by less than this share. Preset best: 1e-5, paper: 0.",
     },
     Field {
+        name: "coarse_tolerance",
+        kind: Kind::Number { min: 0.0, max: 1.0 },
+        default: Default::Absent,
+        doc: "The same for all stages but the last, where larger: 1e-3 saves most of their iterations, but leaves some \
+              templates worse placed for the next order. 0 when absent.",
+    },
+    Field {
         name: "untangle",
         kind: Kind::Boolean,
         default: Default::Boolean(true),
@@ -276,12 +300,41 @@ pub static FIELDS: &[Field] = &[
     },
 ];
 
+/// What a shell does not read: it has no surface energy and one term.
+pub const WITHOUT_EFFECT_ON_SHELLS: &[&str] = &[
+    "lambda",
+    "lambda_far",
+    "adaptive",
+    "adaptive_indicator",
+    "adaptive_share",
+    "adaptive_steps",
+    "distance",
+    "anisotropy",
+    "surface_samples",
+    "repairs",
+    "crease_angle",
+];
+
+/// What a subdivision volume does not read.
+pub const WITHOUT_EFFECT_ON_SUBDIVISIONS: &[&str] = &[
+    "adaptive",
+    "adaptive_indicator",
+    "adaptive_share",
+    "adaptive_steps",
+    "repairs",
+    "raise",
+    "solver",
+    "refresh",
+];
+
 /// A stage.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stage {
     pub lambda: f64,
     pub order: usize,
     pub iterations: u64,
+    /// Share of its change in an iteration below which the energy has converged.
+    pub tolerance: f64,
 }
 
 /// Which terms the surface energy has.
@@ -308,7 +361,8 @@ pub struct Settings {
     pub memory: usize,
     pub refresh: u64,
     pub gradient_tolerance: f64,
-    pub change_tolerance: f64,
+    /// Tolerance of stages before the last.
+    pub coarse_tolerance: f64,
     pub untangle: bool,
     pub repairs: usize,
     pub levels: usize,
@@ -317,9 +371,17 @@ pub struct Settings {
     pub files: Option<Vec<String>>,
 }
 
+/// What chooses the elements whose orders are raised.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Indicator {
+    Distance,
+    Energy,
+}
+
 /// Raising single orders.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Adaptive {
+    pub indicator: Indicator,
     pub share: f64,
     pub steps: usize,
     pub most: usize,
@@ -389,9 +451,15 @@ impl Settings {
             })
         };
         let far = settings.get("lambda_far").and_then(Value::as_f64);
-        let far = far.unwrap_or(if paper { 50.0 } else { 0.0 });
+        let far = far.unwrap_or(50.0);
         let order = number("order") as usize;
         let limit = number("iteration_limit") as u64;
+        let given = |name: &str, best: f64| {
+            let value = settings.get(name).and_then(Value::as_f64);
+            value.unwrap_or(if paper { 0.0 } else { best })
+        };
+        let tolerance = given("change_tolerance", 1e-5);
+        let coarse_tolerance = tolerance.max(given("coarse_tolerance", 0.0));
         let mut stages = Vec::new();
         match settings.get("schedule").and_then(Value::as_array) {
             Some(list) => {
@@ -405,6 +473,7 @@ impl Settings {
                         lambda,
                         order: order as usize,
                         iterations: stage.get("iterations").and_then(Value::as_u64).unwrap_or(limit),
+                        tolerance,
                     });
                 }
             }
@@ -412,13 +481,17 @@ impl Settings {
                 stages = default_schedule(
                     order,
                     &text("raise"),
-                    far,
+                    (far, whole("far_steps").unwrap_or(if paper { 1 } else { 3 })),
                     number("lambda"),
-                    number("far_steps") as usize,
                     limit,
+                    tolerance,
                     flag("adaptive"),
                 )
             }
+        }
+        let last = stages.len().saturating_sub(1);
+        for stage in &mut stages[..last] {
+            stage.tolerance = coarse_tolerance;
         }
         if stages.is_empty() {
             return Err(invalid("the schedule has no stage; give at least one".to_string()));
@@ -463,6 +536,11 @@ impl Settings {
         };
         Ok(Settings {
             adaptive: flag("adaptive").then(|| Adaptive {
+                indicator: if text("adaptive_indicator") == "energy" {
+                    Indicator::Energy
+                } else {
+                    Indicator::Distance
+                },
                 share: number("adaptive_share"),
                 steps: number("adaptive_steps") as usize,
                 most: order,
@@ -483,10 +561,7 @@ impl Settings {
             memory: number("memory") as usize,
             refresh: number("refresh") as u64,
             gradient_tolerance: number("gradient_tolerance"),
-            change_tolerance: settings
-                .get("change_tolerance")
-                .and_then(Value::as_f64)
-                .unwrap_or(if paper { 0.0 } else { 1e-5 }),
+            coarse_tolerance,
             untangle: flag("untangle"),
             levels,
             crease_angle: number("crease_angle"),
@@ -513,10 +588,10 @@ impl Settings {
 fn default_schedule(
     order: usize,
     raise: &str,
-    far: f64,
+    (far, far_steps): (f64, usize),
     close: f64,
-    far_steps: usize,
     iterations: u64,
+    tolerance: f64,
     adaptive: bool,
 ) -> Vec<Stage> {
     let direct = raise == "direct";
@@ -529,6 +604,7 @@ fn default_schedule(
                 lambda: far.powf(1.0 - share) * close.powf(share),
                 order: first,
                 iterations,
+                tolerance,
             });
         }
     }
@@ -538,6 +614,7 @@ fn default_schedule(
             lambda: close,
             order: here,
             iterations,
+            tolerance,
         });
         if here >= order || adaptive {
             return stages;

@@ -121,7 +121,7 @@ pub fn grow(surface: &TriangleMesh, distance: f64, layers: usize, side: &str) ->
 }
 
 /// The surface without points that no triangle uses.
-fn used(surface: &TriangleMesh) -> TriangleMesh {
+pub(super) fn used(surface: &TriangleMesh) -> TriangleMesh {
     let mut names = vec![u32::MAX; surface.points.len()];
     let mut result = TriangleMesh::default();
     for cell in &surface.cells {
@@ -218,7 +218,12 @@ pub(super) fn run(
     observer: &mut dyn Observer,
 ) -> Result<(StopReason, String), Failure> {
     let mut outcome = (StopReason::Converged, String::new());
-    for stage in fit.settings.stages.clone() {
+    let stages = fit.settings.stages.clone();
+    for (place, &stage) in stages.iter().enumerate() {
+        // Phases that differ in lambda alone are one here.
+        if stages.get(place + 1).is_some_and(|next| next.order == stage.order) {
+            continue;
+        }
         let orders: Vec<usize> = fit.space.orders.iter().map(|&order| order.max(stage.order)).collect();
         fit.raise(&orders)?;
         let chart = Chart::fixing(&fixed(fit, shell), &fit.x);

@@ -17,6 +17,11 @@ use std::rc::Rc;
 /// Share of the least determinant that a step must leave.
 const LEAST_SHARE: f64 = 0.2;
 
+/// A preconditioner is made anew after so many steps in a row that are shorter than this: the barrier then bends the energy
+/// otherwise than the model does.
+const SHORT_STEPS: u32 = 6;
+const SHORT: f64 = 0.1;
+
 /// Tells the world and remembers.
 struct Recorder<'a> {
     observer: &'a mut dyn Observer,
@@ -31,6 +36,8 @@ struct Recorder<'a> {
     nodes: usize,
     increases: &'a mut usize,
     previous: f64,
+    preconditioned: bool,
+    short: u32,
 }
 
 impl Observer for Recorder<'_> {
@@ -40,6 +47,11 @@ impl Observer for Recorder<'_> {
 
     fn iterate(&mut self, iterate: &Iterate) {
         self.floor.set(LEAST_SHARE * self.latest.get().least_determinant);
+        self.short = if iterate.iteration > 0 && iterate.step < SHORT {
+            self.short + 1
+        } else {
+            0
+        };
         if iterate.iteration == 0 && self.skip_start {
             return;
         }
@@ -68,7 +80,9 @@ impl Observer for Recorder<'_> {
     }
 
     fn stop(&self) -> Option<StopReason> {
-        self.observer.stop()
+        let stale = self.preconditioned && self.short >= SHORT_STEPS;
+        // As at the end of a round: the stage goes on with the next.
+        self.observer.stop().or_else(|| stale.then_some(StopReason::StepLimit))
     }
 }
 
@@ -137,7 +151,8 @@ impl Fit<'_> {
                     boundary: &boundary,
                     samples: &samples,
                     lambda: stage.lambda,
-                    size: self.size,
+                    x: &self.x,
+                    references: &self.references,
                     volume: self.reference_volume,
                     surface: factor,
                     anisotropy: settings.anisotropy,
@@ -172,7 +187,7 @@ impl Fit<'_> {
                 stopping: Stopping {
                     gradient_norm: settings.gradient_tolerance,
                     relative_decrement: 0.0,
-                    relative_change: settings.change_tolerance,
+                    relative_change: stage.tolerance,
                     iterations: round,
                     ..Stopping::default()
                 },
@@ -191,6 +206,8 @@ impl Fit<'_> {
                 rows: &mut self.rows,
                 increases: &mut self.increases,
                 previous,
+                preconditioned,
+                short: 0,
             };
             let start = match &mut chart {
                 Some((_, unknowns)) => std::mem::take(*unknowns),
@@ -214,7 +231,7 @@ impl Fit<'_> {
                 solution.stop == StopReason::Converged && solution.gradient_norm >= settings.gradient_tolerance;
             let again = by_change
                 && solution.counters.iterations > 0
-                && settled - solution.value > 5.0 * settings.change_tolerance * solution.value.abs();
+                && settled - solution.value > 5.0 * stage.tolerance * solution.value.abs();
             if again {
                 settled = solution.value;
             }

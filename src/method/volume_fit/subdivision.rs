@@ -42,7 +42,6 @@ pub(super) fn run(
         fit.volume = subdivided.mesh;
         fit.topology = fit.volume.topology().map_err(invalid)?;
         fit.references = references_of_volume(fit.volume.iter().map(|cell| cell.0), fit.reference_volume);
-        fit.size = (fit.reference_volume / fit.volume.cells() as f64).cbrt();
         let orders = vec![1; fit.volume.cells()];
         fit.space = Space::new(&fit.volume, &fit.topology, fit.settings.basis, &orders).map_err(invalid)?;
         fit.x = fit.space.linear(&fit.volume.points);

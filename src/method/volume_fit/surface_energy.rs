@@ -28,8 +28,8 @@ pub struct Scale {
 }
 
 impl Scale {
-    /// Of a target, or of the template where the target's are not defined (point clouds, soups that do not close).
-    pub fn of(target: &Target, template: &TriangleMesh, template_volume: f64) -> Scale {
+    /// Of a target whose triangles enclose a volume (`closed`), or else of the template's boundary.
+    pub fn of(target: &Target, closed: bool, template: &TriangleMesh, template_volume: f64) -> Scale {
         let own = Scale {
             area: template.area(),
             volume: template_volume,
@@ -39,10 +39,9 @@ impl Scale {
         }
         let area = target.surface.area();
         let volume = target.surface.enclosed_volume().abs();
-        // Flipped triangles take from the volume: then the template's is nearer the truth.
         Scale {
             area,
-            volume: if volume > 0.5 * own.volume { volume } else { own.volume },
+            volume: if closed && volume > 0.0 { volume } else { own.volume },
         }
     }
 }

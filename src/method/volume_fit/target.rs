@@ -1,12 +1,13 @@
 //! The target: a surface read from a file or generated, damaged on request, or a cloud of points.
 
-use super::shapes;
+use super::{shapes, shell};
 use crate::mesh::format::{self, Content};
 use crate::mesh::mixed::MixedMesh;
 use crate::mesh::{self, TriangleMesh};
 use crate::method::Failure;
 use crate::method::model::Part;
 use serde_json::Value;
+use std::collections::BTreeMap;
 
 /// What the boundary is fitted to, in the units of its file.
 #[derive(Clone, Debug, Default)]
@@ -68,8 +69,10 @@ pub fn read(part: &Part) -> Result<Target, Failure> {
                     let content = format::read(name, bytes).map_err(|error| invalid(error.to_string()))?;
                     notices.extend(content.notices.iter().map(|notice| format!("target: {notice}")));
                     let surface = triangles(&content);
-                    if surface.cells.is_empty() && !(content.tetrahedra.is_empty() && content.hexahedra.is_empty()) {
-                        let (volume, _) = MixedMesh::from_content(&content).map_err(invalid)?;
+                    let solids = content.tetrahedra.len() + content.hexahedra.len() + content.prisms.len();
+                    if surface.cells.is_empty() && solids > 0 {
+                        let (volume, found) = MixedMesh::from_content(&content).map_err(invalid)?;
+                        notices.extend(found.into_iter().map(|notice| format!("target: {notice}")));
                         let topology = volume.topology().map_err(invalid)?;
                         topology.boundary_triangles(&volume.points)
                     } else {
@@ -80,11 +83,25 @@ pub fn read(part: &Part) -> Result<Target, Failure> {
             for point in &mut surface.points {
                 *point = point.map(|coordinate| coordinate * scale);
             }
+            if !surface.cells.is_empty() {
+                // A stray point far away would make the box, and with it the unit of length, meaningless.
+                surface = shell::used(&surface);
+            }
             (surface, parameters)
         }
     };
     if clean.points.is_empty() {
         return Err(invalid("the target has neither triangles nor points".to_string()));
+    }
+    if let Some(place) = clean
+        .points
+        .iter()
+        .position(|point| !point.iter().all(|coordinate| coordinate.is_finite()))
+    {
+        return Err(invalid(format!(
+            "vertex {place} of the target is at {:?}; coordinates must be finite numbers",
+            clean.points[place]
+        )));
     }
     let mut target = Target {
         surface: damaged(&clean, parameters),
@@ -137,6 +154,62 @@ fn cloud(name: &str, bytes: &[u8]) -> Result<Option<Vec<[f64; 3]>>, Failure> {
         }
     }
     Ok(Some(points))
+}
+
+/// Whether a surface encloses a volume, and what of it does not.
+#[derive(Clone, Debug)]
+pub struct Closure {
+    /// The triangles over vertices that are one where they are at one place; those with a vertex twice are left out.
+    pub joined: TriangleMesh,
+    pub edges: usize,
+    /// Edges with one triangle.
+    pub open: usize,
+    /// Edges with more that do not run through them as often one way as the other.
+    pub turned: usize,
+}
+
+impl Closure {
+    /// Looks at every edge; a soup of triangles may well be closed.
+    pub fn of(surface: &TriangleMesh) -> Closure {
+        let mut named: BTreeMap<[u64; 3], u32> = BTreeMap::new();
+        let names: Vec<u32> = surface
+            .points
+            .iter()
+            .map(|point| {
+                let count = named.len() as u32;
+                // Adding 0 makes -0 the same as 0.
+                *named
+                    .entry(point.map(|coordinate| (coordinate + 0.0).to_bits()))
+                    .or_insert(count)
+            })
+            .collect();
+        let cells = surface
+            .cells
+            .iter()
+            .map(|cell| cell.map(|corner| names[corner as usize]));
+        let joined = TriangleMesh {
+            points: Vec::new(),
+            cells: cells.filter(|[a, b, c]| a != b && b != c && c != a).collect(),
+        };
+        let mut sides = BTreeMap::<[u32; 2], [usize; 2]>::new();
+        for cell in &joined.cells {
+            for place in 0..3 {
+                let (a, b) = (cell[place], cell[(place + 1) % 3]);
+                sides.entry([a.min(b), a.max(b)]).or_default()[usize::from(a > b)] += 1;
+            }
+        }
+        let count = |wanted: &dyn Fn(&[usize; 2]) -> bool| sides.values().filter(|sides| wanted(sides)).count();
+        Closure {
+            edges: sides.len(),
+            open: count(&|sides| sides[0] + sides[1] == 1),
+            turned: count(&|sides| sides[0] + sides[1] > 1 && sides[0] != sides[1]),
+            joined,
+        }
+    }
+
+    pub fn is_closed(&self) -> bool {
+        self.edges > 0 && self.open + self.turned == 0
+    }
 }
 
 fn centroids(surface: &TriangleMesh) -> Vec<[f64; 3]> {

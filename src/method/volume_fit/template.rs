@@ -1,11 +1,14 @@
 //! The template: read or generated, shaped by its recipe, laid into the target.
 
 use super::shell::{self, Shell};
-use super::target::Target;
+use super::target::{Closure, Target};
 use crate::fem::basis::Basis;
+use crate::fem::boundary::Boundary;
 use crate::fem::coefficient_file;
+use crate::fem::space::Space;
+use crate::mesh::TriangleMesh;
 use crate::mesh::format;
-use crate::mesh::mixed::MixedMesh;
+use crate::mesh::mixed::{MixedMesh, Topology};
 use crate::mesh::template::{carve, collapse, extrude, grid, pillow, voxels};
 use crate::mesh::{bounding_box, diagonal, generate};
 use crate::method::Failure;
@@ -58,8 +61,16 @@ pub fn read(part: &Part, target: Option<&Target>, notices: &mut Vec<String>) -> 
                     let percent = parameters.get("distance").and_then(Value::as_f64).unwrap_or(2.0);
                     let side = parameters.get("side").and_then(Value::as_str).unwrap_or("both");
                     let distance = 0.01 * percent * diagonal(&target.surface.points);
-                    let (mesh, grown) =
-                        shell::grow(&target.surface, distance, count("layers", 2), side).map_err(invalid)?;
+                    let mut surface = target.surface.clone();
+                    if Closure::of(&surface).is_closed() && surface.enclosed_volume() < 0.0 {
+                        notices.push(
+                            "the target is inside out and has been turned, as outside is along normals".to_string(),
+                        );
+                        for cell in &mut surface.cells {
+                            cell.swap(1, 2);
+                        }
+                    }
+                    let (mesh, grown) = shell::grow(&surface, distance, count("layers", 2), side).map_err(invalid)?;
                     shell = Some(grown);
                     mesh
                 }
@@ -136,6 +147,31 @@ pub struct Template {
     pub map: Option<Map>,
     /// What the cells strive for where they are layers on a surface.
     pub shell: Option<Shell>,
+}
+
+/// Intervals between samples along an edge of a curved template that is its own target.
+const FINE: usize = 12;
+
+impl Template {
+    /// Its boundary as triangles, sampled where it is curved.
+    ///
+    /// # Errors
+    /// As [`Space::new`].
+    pub fn boundary(&self, topology: &Topology) -> Result<TriangleMesh, String> {
+        let Some(map) = &self.map else {
+            return Ok(topology.boundary_triangles(&self.mesh.points));
+        };
+        let space = Space::new(&self.mesh, topology, map.basis, &map.orders)?;
+        let highest = map.orders.iter().copied().max().unwrap_or(1);
+        let intervals = if highest == 1 { 1 } else { (2 * highest).max(FINE) };
+        let boundary = Boundary::new(&self.mesh, topology, &space, intervals);
+        let mut points = Vec::new();
+        boundary.positions(&map.x, &mut points);
+        Ok(TriangleMesh {
+            points,
+            cells: boundary.triangles,
+        })
+    }
 }
 
 /// A map over a template as a coefficient file gives it.

@@ -26,6 +26,9 @@ pub struct Certificates {
 /// Parts that an element is cut into at most.
 const MOST_PARTS: usize = 4000;
 
+/// Elements judged before the observer is asked again.
+const CHUNK: usize = 16;
+
 /// Proves that determinants are positive everywhere, element by element.
 pub fn certify(space: &Space, references: &[Columns<f64>], x: &[f64], observer: &dyn Observer) -> Certificates {
     let cells = space.cells.len();
@@ -37,6 +40,7 @@ pub fn certify(space: &Space, references: &[Columns<f64>], x: &[f64], observer: 
         notices: Vec::new(),
     };
     let mut first: Option<(usize, [f64; 3], f64)> = None;
+    let mut open: Option<f64> = None;
     while result.verdicts.len() < cells {
         if observer.stop().is_some() {
             result.verdicts.resize(cells, Judged::Undecided);
@@ -46,7 +50,7 @@ pub fn certify(space: &Space, references: &[Columns<f64>], x: &[f64], observer: 
             break;
         }
         let start = result.verdicts.len();
-        let verdicts: Vec<Verdict> = (start..(start + 64).min(cells))
+        let verdicts: Vec<Verdict> = (start..(start + CHUNK).min(cells))
             .into_par_iter()
             .map(|cell| certifier.judge(space, cell, &references[cell], x))
             .collect();
@@ -60,9 +64,18 @@ pub fn certify(space: &Space, references: &[Columns<f64>], x: &[f64], observer: 
                     first.get_or_insert((start + offset, point, value));
                     Judged::Fails
                 }
-                Verdict::Undecided => Judged::Undecided,
+                Verdict::Undecided(bound) => {
+                    open = Some(open.map_or(bound, |other: f64| other.min(bound)));
+                    Judged::Undecided
+                }
             });
         }
+    }
+    if let Some(bound) = open {
+        result.notices.push(format!(
+            "elements stay undecided after {MOST_PARTS} parts: no point of theirs with a determinant below 0 was found, and a \
+             proof only that it is at least {bound:.3e}"
+        ));
     }
     if let Some((cell, point, value)) = first {
         let count = result

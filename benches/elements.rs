@@ -1,5 +1,5 @@
-//! Time per unknown for energy and gradient of 8^3 hexahedra of orders 2 to 8, on one thread, with `order + 1` Gauss points
-//! a direction (exact to twice the order).
+//! Time per unknown for energy and gradient of 8^3 hexahedra of orders 2 to 8, on one thread, with `order + 1` Gauss
+//! points a direction (exact to twice the order).
 //!
 //! `cargo bench --bench elements [cells a side]`. Each figure is a mean over 0.5 s of this thread's own time.
 

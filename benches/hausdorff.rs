@@ -1,9 +1,9 @@
 //! Time and figures of the distance between two surfaces.
 //!
 //! `cargo bench --bench hausdorff -- FIRST SECOND [...]`: the first surface against the second, both ways, then the next
-//! pair. Without files a bumpy sphere against its noisy copy. `RAYON_NUM_THREADS` sets the number of threads, `SPACING` the
-//! spacing of the samples as a share of the diagonal. Processor time is shown beside wall time, for other load counts in
-//! the latter.
+//! pair. Without files a bumpy sphere against its noisy copy. `RAYON_NUM_THREADS` sets the number of threads,
+//! `SPACING` the spacing of the samples as a share of the diagonal. Processor time is shown beside wall time, for
+//! other load counts in the latter.
 
 use std::time::Instant;
 use vargeo::geometry::closest_point::ClosestPoint;

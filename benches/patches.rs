@@ -1,4 +1,5 @@
-//! Time per point of a biquartic patch evaluated at 9 by 9 points, one point at a time and eight side by side, on one thread.
+//! Time per point of a biquartic patch evaluated at 9 by 9 points, one point at a time and eight side by side, on one
+//! thread.
 //!
 //! `cargo bench --bench patches`. Each figure is a mean over 0.3 s.
 

@@ -1,9 +1,9 @@
 //! Time of the restricted Voronoi diagram with the centroidal energy and its gradient, on one thread and on several.
 //!
-//! `cargo bench --bench restricted_voronoi -- [surface.obj] [sites...]`; a bumpy torus of 60k triangles and 1k, 10k and 100k
-//! sites by default. Sites are spread at random and relaxed by Lloyd's iteration. Figures for
-//! one thread are its own time, for several the time on the wall; the best of several runs. `l-bfgs`: 30 iterations from
-//! scattered sites.
+//! `cargo bench --bench restricted_voronoi -- [surface.obj] [sites...]`; a bumpy torus of 60k triangles and 1k, 10k
+//! and 100k sites by default. Sites are spread at random and relaxed by Lloyd's iteration. Figures for one thread are
+//! its own time, for several the time on the wall; the best of several runs. `l-bfgs`: 30 iterations from scattered
+//! sites.
 
 use std::f64::consts::TAU;
 use std::time::Instant;

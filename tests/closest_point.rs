@@ -1,5 +1,5 @@
-//! Closest points agree with brute force on every processor, whatever the triangles; distances between surfaces with known
-//! values, to the bit with any number of threads.
+//! Closest points agree with brute force on every processor, whatever the triangles; distances between surfaces with
+//! known values, to the bit with any number of threads.
 
 use vargeo::geometry::closest_point::{ClosestPoint, Nearest, foot};
 use vargeo::linalg::processor::Processor;

@@ -333,7 +333,8 @@ fn separate_parts_do_not_influence_each_other() {
 
 #[test]
 fn estimated_rounding_bounds_the_difference_of_two_systems() {
-    // Both systems have the same exact solution, whatever the triangles. A vertex ever nearer to its neighbour makes needles.
+    // Both systems have the same exact solution, whatever the triangles. A vertex ever nearer to its neighbour makes
+    // needles.
     let mut worst = 0.0f64;
     for distance in [1.0, 1e-2, 1e-4] {
         let mesh = grid(12, |lines| {

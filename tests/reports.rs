@@ -122,7 +122,8 @@ fn series_are_told_apart_without_colour() {
     assert_eq!(chart.series.len(), 4);
     assert!(chart.series.iter().all(|series| series.phases == [8.0]));
     let svg = plot::svg::standalone(&chart).unwrap();
-    // The second series is dashed: its path begins anew for each dash; every series has its own kind of marker and its name.
+    // The second series is dashed: its path begins anew for each dash; every series has its own kind of marker and its
+    // name.
     let path = |index: usize| {
         svg.split(&format!("<path class=\"s{index}\" stroke-width=\"9\" d=\""))
             .nth(1)

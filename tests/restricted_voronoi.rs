@@ -50,8 +50,8 @@ fn soup(corners: Vec<Point>) -> (Vec<Point>, Vec<[u32; 3]>) {
     (corners, cells)
 }
 
-/// A piece by definition: the triangle cut by the bisector with every other site in turn. `offsets` are added to the squared
-/// distances.
+/// A piece by definition: the triangle cut by the bisector with every other site in turn. `offsets` are added to the
+/// squared distances.
 fn brute_force(triangle: [Point; 3], sites: &[Point], offsets: &[f64], i: usize) -> Vec<Point> {
     let mut polygon = triangle.to_vec();
     for (j, &other) in sites.iter().enumerate() {
@@ -74,8 +74,8 @@ fn brute_force(triangle: [Point; 3], sites: &[Point], offsets: &[f64], i: usize)
     polygon
 }
 
-/// Checks what holds for every input: areas sum to the triangles', every piece's points are nearest to its site, edges lie
-/// where their labels say. Returns the number of pieces.
+/// Checks what holds for every input: areas sum to the triangles', every piece's points are nearest to its site, edges
+/// lie where their labels say. Returns the number of pieces.
 fn check(name: &str, points: &[Point], cells: &[[u32; 3]], sites: &[Point]) -> usize {
     let mut diagram = RestrictedVoronoi::new(points, cells).expect("a valid surface");
     let mut areas = vec![0.0; cells.len()];
@@ -330,8 +330,8 @@ fn adversarial_inputs() {
     }
 }
 
-/// Two sheets with opposite normals in one place are told apart by the compatibility, and the plain diagram when it weighs
-/// nothing.
+/// Two sheets with opposite normals in one place are told apart by the compatibility, and the plain diagram when it
+/// weighs nothing.
 #[test]
 fn normal_compatibility() {
     let (points, cells) = soup(vec![
@@ -439,7 +439,8 @@ fn every_way_of_cutting() {
     }
 }
 
-/// More sites than are cut at once, as near to each other along a line or all over a triangle: time and memory stay bounded.
+/// More sites than are cut at once, as near to each other along a line or all over a triangle: time and memory stay
+/// bounded.
 #[test]
 fn many_sites_as_near() {
     // On circles about an edge of one triangle and about a line through another.

@@ -1,5 +1,5 @@
-//! Files of curved volumes: the order of points that VTK 9.7 and Gmsh 4.15 state themselves, one point where cells meet, and
-//! coefficients that come back to the last bit or not at all.
+//! Files of curved volumes: the order of points that VTK 9.7 and Gmsh 4.15 state themselves, one point where cells
+//! meet, and coefficients that come back to the last bit or not at all.
 
 use proptest::prelude::*;
 use std::collections::BTreeMap;

@@ -407,7 +407,7 @@ fn cells_numbered_inside_out_are_turned_and_folded_ones_are_not() {
 fn single_orders_rise_where_the_boundary_is_far() {
     let run = |settings: Value| {
         fit(
-            json!({ "generate": "grid", "x": 2, "y": 1, "z": 1 }),
+            json!({ "generate": "grid", "x": 3, "y": 2, "z": 1 }),
             Some(json!({ "shape": "pebble", "triangles": 500 })),
             settings,
         )
@@ -416,9 +416,12 @@ fn single_orders_rise_where_the_boundary_is_far() {
     let linear = run(json!({ "order": 1, "iteration_limit": 30 }));
     for indicator in ["distance", "energy"] {
         let raised = run(
-            json!({ "order": 3, "adaptive": true, "adaptive_indicator": indicator, "adaptive_steps": 2, "adaptive_share": 0.3, "iteration_limit": 30 }),
+            json!({ "order": 3, "adaptive": true, "adaptive_indicator": indicator, "adaptive_steps": 1, "adaptive_share": 0.05, "iteration_limit": 30 }),
         );
-        assert!(raised.metrics["node_share"] < 100.0 && raised.metrics["nodes"] > linear.metrics["nodes"]);
+        // Some are raised by one, not all.
+        let mean = raised.metrics["order_mean"];
+        assert!(mean > 1.0 && mean < 2.0, "{indicator}: {mean}");
+        assert!(raised.metrics["nodes"] > linear.metrics["nodes"]);
         assert!(raised.metrics["hausdorff"] < linear.metrics["hausdorff"], "{indicator}");
         assert_eq!(raised.metrics["inverted"], 0.0);
     }

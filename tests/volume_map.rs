@@ -484,7 +484,8 @@ fn every_solver_tells_why_it_stopped() {
     assert_eq!(stalled.stop, "stalled", "{}", stalled.reason);
 }
 
-/// LPM has no stiffness at all where the map shrinks every length below 1/sqrt 3: the positive part of its Hessian is zero.
+/// LPM has no stiffness at all where the map shrinks every length below 1/sqrt 3: the positive part of its Hessian is
+/// zero.
 #[test]
 fn a_hessian_without_any_positive_part_still_gives_a_descent() {
     for solver in ["projected-newton", "relaxed-newton"] {

@@ -20,8 +20,8 @@ pub struct Input {
 }
 
 impl Input {
-    /// Reads the file and unfolds its plan. What is wrong or doubtful is printed on standard error; the plan's notices are
-    /// left to the caller.
+    /// Reads the file and unfolds its plan. What is wrong or doubtful is printed on standard error; the plan's notices
+    /// are left to the caller.
     pub fn plan(&self) -> Result<Plan, Exit> {
         let experiment = Experiment::read(&self.file, method::methods()).map_err(|diagnostics| fail(&diagnostics))?;
         show(&experiment.origin.warnings);

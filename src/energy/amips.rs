@@ -1,5 +1,5 @@
-//! Advanced MIPS: the exponential of the mean of MIPS and volume distortion, which punishes the worst elements. Least, e^2,
-//! at rotations. Overflows to plus infinity where the mean exceeds about 350.
+//! Advanced MIPS: the exponential of the mean of MIPS and volume distortion, which punishes the worst elements. Least,
+//! e^2, at rotations. Overflows to plus infinity where the mean exceeds about 350.
 
 use super::Description;
 use super::isotropic::Isotropic;

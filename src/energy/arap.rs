@@ -1,5 +1,5 @@
-//! As rigid as possible: the squared distance of the Jacobian to the nearest rotation. Zero at rotations; sees reflections,
-//! because the singular values are signed, but does not prevent them.
+//! As rigid as possible: the squared distance of the Jacobian to the nearest rotation. Zero at rotations; sees
+//! reflections, because the singular values are signed, but does not prevent them.
 
 use super::Description;
 use super::separable::Separable;

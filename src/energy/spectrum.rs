@@ -185,7 +185,8 @@ impl<V: Vector> Spectrum<V> {
 /// these second derivatives (00, 01, 02, 11, 12, 22) by A, B, D.
 ///
 /// No division by differences of singular values: for the pair i, j without k,
-/// `flip = 2 Psi_A + 2 Psi_B (s_k^2 - s_i s_j) - Psi_D s_k` and `twist = 2 Psi_A + 2 Psi_B (s_k^2 + s_i s_j) + Psi_D s_k`.
+/// `flip = 2 Psi_A + 2 Psi_B (s_k^2 - s_i s_j) - Psi_D s_k` and `twist = 2 Psi_A + 2 Psi_B (s_k^2 + s_i s_j) + Psi_D
+/// s_k`.
 #[inline(always)]
 pub fn spectrum_by_invariants<S: Scalar>(s: [S; 3], value: S, g: [S; 3], h: [S; 6]) -> Spectrum<S> {
     let zero = S::constant(0.0);

@@ -1,5 +1,5 @@
-//! Stretch: the squared norm of the inverse Jacobian, Sander's texture stretch in three dimensions. A barrier that vanishes
-//! at infinite size, so it needs a fixed boundary.
+//! Stretch: the squared norm of the inverse Jacobian, Sander's texture stretch in three dimensions. A barrier that
+//! vanishes at infinite size, so it needs a fixed boundary.
 
 use super::Description;
 use super::isotropic::Isotropic;

@@ -124,7 +124,8 @@ pub struct Expectation {
     /// The stop reason that must be met, such as `converged` or `infeasible`.
     pub stop: Option<String>,
     pub bounds: BTreeMap<String, Bound>,
-    /// `d_ma = { less_than = { energy = "dirichlet" } }`: our metric below that of the job that differs only in these axes.
+    /// `d_ma = { less_than = { energy = "dirichlet" } }`: our metric below that of the job that differs only in these
+    /// axes.
     pub comparisons: Vec<Comparison>,
     /// 1-based line in the file, for messages.
     pub line: usize,

@@ -1,8 +1,8 @@
 //! The cells of a space sorted by kind and packed eight to a batch, with what is needed to form their Jacobians.
 //!
-//! The Jacobian of a cell is taken against its reference shape, `J = J_h A^-1`: A has the reference's edges as columns, so
-//! a cell that equals its reference up to a rotation has a rotation as Jacobian. (The paper prints `A^-T`, with which the
-//! ideal prism and tetrahedron would have energy.)
+//! The Jacobian of a cell is taken against its reference shape, `J = J_h A^-1`: A has the reference's edges as
+//! columns, so a cell that equals its reference up to a rotation has a rotation as Jacobian. (The paper prints `A^-T`,
+//! with which the ideal prism and tetrahedron would have energy.)
 
 use super::element::{Element, Room};
 use super::quadrature::CellQuadrature;

@@ -1,12 +1,12 @@
 //! Hexahedra with 5 by 5 by 5 control points, and the sign of their Jacobian determinant on the whole of them.
 //!
-//! The map is `X = sum P_ijk B_i(u) B_j(v) B_k(w)` over Bernstein polynomials of degree 4. Its determinant is a polynomial of
-//! degree 11 in every variable; its Bernstein coefficients follow from products of polynomials, and the least of them is a
-//! lower bound. Where that is not positive the cube is halved and the bound sharpens, until it is positive or a corner of a
-//! part shows a determinant that is not.
+//! The map is `X = sum P_ijk B_i(u) B_j(v) B_k(w)` over Bernstein polynomials of degree 4. Its determinant is a
+//! polynomial of degree 11 in every variable; its Bernstein coefficients follow from products of polynomials, and the
+//! least of them is a lower bound. Where that is not positive the cube is halved and the bound sharpens, until it is
+//! positive or a corner of a part shows a determinant that is not.
 //!
-//! Guaranteed: [`Verdict::Positive`] up to the rounding of the coefficients, for which a margin is kept. Not guaranteed: a
-//! verdict for determinants that touch zero; then the bisection ends undecided.
+//! Guaranteed: [`Verdict::Positive`] up to the rounding of the coefficients, for which a margin is kept. Not
+//! guaranteed: a verdict for determinants that touch zero; then the bisection ends undecided.
 
 use crate::linalg::vector3::{cross, dot};
 
@@ -32,9 +32,9 @@ pub enum Verdict {
     Undecided { bound: f64 },
 }
 
-/// The hexahedron between six faces by linear blending (Gordon and Hall 1973): faces less edges plus corners. Faces are given
-/// by their 25 control points in the frame of the hexahedron: `u = 0, 1` with parameters (v, w), `v = 0, 1` with (u, w),
-/// `w = 0, 1` with (u, v); entry `5 a + b`. They must agree along their common edges.
+/// The hexahedron between six faces by linear blending (Gordon and Hall 1973): faces less edges plus corners. Faces
+/// are given by their 25 control points in the frame of the hexahedron: `u = 0, 1` with parameters (v, w), `v = 0, 1`
+/// with (u, w), `w = 0, 1` with (u, v); entry `5 a + b`. They must agree along their common edges.
 pub fn transfinite(faces: &[[[f64; 3]; 25]; 6]) -> ControlPoints {
     let mut points = [[0.0; 3]; 125];
     let blend = |index: usize, end: usize| {

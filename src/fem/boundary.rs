@@ -13,7 +13,8 @@ struct Patch {
     /// Corners in the frame: a quad's `(0,0), (1,0), (1,1), (0,1)`; a triangle's ascending.
     corners: [u32; 4],
     order: usize,
-    /// By function: a quad's `(i, j)` at `i n + j` over line functions, a triangle's as tabulated with the last corner last.
+    /// By function: a quad's `(i, j)` at `i n + j` over line functions, a triangle's as tabulated with the last corner
+    /// last.
     slots: Vec<Slot>,
     /// Number of every lattice point, and whether this face is the one to place it.
     samples: Vec<u32>,

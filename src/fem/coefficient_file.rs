@@ -2,8 +2,9 @@
 //!
 //! A header of text lines, `vargeo-coefficients 1`, then `basis NAME`, `vertices N`, `hexahedra N`, `prisms N`,
 //! `tetrahedra N`, `nodes N`, `checksum HEX`, `data`, each ended by a line feed; then binary data, little-endian: the
-//! corners of all cells as `u32` (eight, six or four a cell, as in VTK, in the order of the header), the order of every cell
-//! as `u8`, and three `f64` a node, nodes numbered as in [`Space`]. The checksum is 64-bit FNV-1a over the data.
+//! corners of all cells as `u32` (eight, six or four a cell, as in VTK, in the order of the header), the order of
+//! every cell as `u8`, and three `f64` a node, nodes numbered as in [`Space`]. The checksum is 64-bit FNV-1a over the
+//! data.
 //!
 //! Guaranteed: sizes are compared with the bytes that are there before memory is taken; what reads is a conforming mesh
 //! with orders in range and finite coefficients. Not guaranteed: that its cells are valid.

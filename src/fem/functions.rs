@@ -170,8 +170,8 @@ pub fn line_table(basis: &dyn Basis, order: usize, points: &[f64]) -> Table<1> {
 }
 
 /// The functions of a triangle: corners, edges by [`TRIANGLE_EDGES`], then inside with `c = last`, a and b being the
-/// other two in ascending order. `edge(a, b, j)` is `E_ab,j` and `weighted(c, k)` is `l_c c_k(l_c)`, as numbers or whatever
-/// is to be known of them.
+/// other two in ascending order. `edge(a, b, j)` is `E_ab,j` and `weighted(c, k)` is `l_c c_k(l_c)`, as numbers or
+/// whatever is to be known of them.
 pub fn triangle_row<T: Copy + Mul<Output = T>>(
     order: usize,
     last: usize,

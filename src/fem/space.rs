@@ -61,8 +61,8 @@ pub struct CellSlots {
     /// For each corner of the functions' frame, the local corner of the mesh: ascending vertices for a tetrahedron, the
     /// identity for others.
     pub corners: [u8; 8],
-    /// By local function. Hexahedron: `(i, j, k)` at `(i n + j) n + k` over line functions. Prism: triangle functions fastest,
-    /// then line functions. Tetrahedron: as tabulated.
+    /// By local function. Hexahedron: `(i, j, k)` at `(i n + j) n + k` over line functions. Prism: triangle functions
+    /// fastest, then line functions. Tetrahedron: as tabulated.
     pub slots: Vec<Slot>,
 }
 

@@ -1,8 +1,8 @@
 //! The distortion energy of a high-order volume: the mean over the reference cells of a density of the Jacobian.
 //!
-//! `E(x) = 1/|Omega| sum_cells sum_q w_q |det A| psi(J_q)` with `J = J_h A^-1` (Jin et al. 2013, equations 2, 7 and 8), and
-//! its gradient by the nodes. Plus infinity where the density is a barrier and a determinant at a quadrature point is
-//! not positive. Positive determinants at all quadrature points do not prove a valid cell; see
+//! `E(x) = 1/|Omega| sum_cells sum_q w_q |det A| psi(J_q)` with `J = J_h A^-1` (Jin et al. 2013, equations 2, 7 and
+//! 8), and its gradient by the nodes. Plus infinity where the density is a barrier and a determinant at a quadrature
+//! point is not positive. Positive determinants at all quadrature points do not prove a valid cell; see
 //! [`certificate`](super::certificate).
 //!
 //! Eight cells go side by side in vector lanes; batches go to threads. Sums have a fixed order: the same bits with any

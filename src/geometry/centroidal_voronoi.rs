@@ -1,8 +1,9 @@
-//! Restricted centroidal Voronoi tessellations: sites spread over a surface so that each lies at the centroid of its cell.
+//! Restricted centroidal Voronoi tessellations: sites spread over a surface so that each lies at the centroid of its
+//! cell.
 //!
-//! They minimize `F = sum_i int_(S cap Vor(i)) |x - y_i|^2 dx` over the sites `y_i`, which move freely in space. The gradient
-//! is `2 m_i (y_i - g_i)` with the areas `m_i` and the centroids `g_i` of the cells (Du, Faber, Gunzburger 1999). L-BFGS
-//! needs far fewer evaluations than Lloyd's iteration `y_i = g_i` (Liu et al. 2009; Yan et al. 2009).
+//! They minimize `F = sum_i int_(S cap Vor(i)) |x - y_i|^2 dx` over the sites `y_i`, which move freely in space. The
+//! gradient is `2 m_i (y_i - g_i)` with the areas `m_i` and the centroids `g_i` of the cells (Du, Faber, Gunzburger
+//! 1999). L-BFGS needs far fewer evaluations than Lloyd's iteration `y_i = g_i` (Liu et al. 2009; Yan et al. 2009).
 //!
 //! Guaranteed: neither method raises the energy; the same bits with any number of threads. Not guaranteed: the global
 //! minimum.
@@ -27,8 +28,8 @@ pub enum Method {
 pub struct Relaxation {
     pub method: Method,
     pub iterations: u64,
-    /// Converged when the root mean square of the distances of sites to centroids, weighted by the cells' areas over their
-    /// mean, is below this share of the spacing, the square root of the mean area.
+    /// Converged when the root mean square of the distances of sites to centroids, weighted by the cells' areas over
+    /// their mean, is below this share of the spacing, the square root of the mean area.
     pub tolerance: f64,
 }
 
@@ -76,8 +77,8 @@ pub fn scatter(points: &[[f64; 3]], cells: &[[u32; 3]], count: usize, seed: u64)
         .collect()
 }
 
-/// The energy over the sites, in units in which its curvature is about 1 and its gradient the root mean square distance of
-/// sites to centroids over the spacing.
+/// The energy over the sites, in units in which its curvature is about 1 and its gradient the root mean square
+/// distance of sites to centroids over the spacing.
 struct Energy<'a> {
     term: &'a mut SquaredDistance,
     points: &'a [[f64; 3]],
@@ -148,8 +149,8 @@ impl Observer for Translator<'_> {
 }
 
 /// Moves `sites` to a centroidal tessellation of the surface that `term` was prepared for, with its vertices at `points`.
-/// The solution holds the sites' coordinates, the energy, and the root mean square distance of sites to centroids over the
-/// spacing as its gradient's norm; so do the iterates told to the observer.
+/// The solution holds the sites' coordinates, the energy, and the root mean square distance of sites to centroids over
+/// the spacing as its gradient's norm; so do the iterates told to the observer.
 ///
 /// # Panics
 /// When `points` are not as many as `term` was prepared for.

@@ -2,12 +2,13 @@
 //!
 //! The sign at the centres of a grid's cubes tells which lie within (a manifold repair adds some, see
 //! [`voxels`]); every pair of neighbours with different signs gives a quad, every corner of
-//! the grid around which signs differ a vertex. Where a pair's segment meets the surface follows from the two distances. The
-//! vertex is where the tangent planes at these places meet in the sense of least squares, pulled towards their mean, and kept
-//! within its cube. Source: Ju, Losasso, Schaefer, Warren 2002, Dual contouring of Hermite data.
+//! the grid around which signs differ a vertex. Where a pair's segment meets the surface follows from the two
+//! distances. The vertex is where the tangent planes at these places meet in the sense of least squares, pulled
+//! towards their mean, and kept within its cube. Source: Ju, Losasso, Schaefer, Warren 2002, Dual contouring of
+//! Hermite data.
 //!
-//! Guaranteed: quads form closed manifold surfaces, oriented outward, however the surface is shaped. Not guaranteed: parts
-//! thinner than a cube, and handles or gaps narrower than one; that quads are convex.
+//! Guaranteed: quads form closed manifold surfaces, oriented outward, however the surface is shaped. Not guaranteed:
+//! parts thinner than a cube, and handles or gaps narrower than one; that quads are convex.
 
 use crate::geometry::closest_point::ClosestPoint;
 use crate::linalg::vector3::{add, dot, subtract, times};
@@ -19,8 +20,8 @@ use nalgebra::{Matrix3, Vector3};
 /// Weight of the pull towards the mean against the tangent planes.
 const PULL: f64 = 0.05;
 
-/// Points and quads around `surface`, with `along` cubes on the longest side of its box. `project` gives the nearest point of
-/// the surface and a normal there, of any length.
+/// Points and quads around `surface`, with `along` cubes on the longest side of its box. `project` gives the nearest
+/// point of the surface and a normal there, of any length.
 ///
 /// # Errors
 /// When the surface is open, not a manifold, or holds no cube.

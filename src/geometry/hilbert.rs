@@ -65,8 +65,8 @@ pub fn place(point: [f64; 3]) -> [u64; 3] {
 }
 
 /// Writes the indices of `points` in their order along the curve over the points' bounding cube. Points in one place are
-/// neighbours, by rising index; false when there are certainly none. `keys` is memory to reuse. Points that are not finite
-/// may come anywhere.
+/// neighbours, by rising index; false when there are certainly none. `keys` is memory to reuse. Points that are not
+/// finite may come anywhere.
 pub fn order(points: &[[f64; 3]], keys: &mut Vec<u64>, order: &mut Vec<u32>) -> bool {
     let mut low = [f64::INFINITY; 3];
     let mut high = [f64::NEG_INFINITY; 3];

@@ -2,8 +2,9 @@
 //! along a Hilbert curve.
 //!
 //! Building is a sort and one sweep, so that a tree for moving points can be built anew for every evaluation. Answers do
-//! not depend on the shape of the tree: they are exact in the rounded squared distances, and ties go to the smaller index.
-//! Of several points in one place only the one with the smallest index is in the tree; the others are its twins.
+//! not depend on the shape of the tree: they are exact in the rounded squared distances, and ties go to the smaller
+//! index. Of several points in one place only the one with the smallest index is in the tree; the others are its
+//! twins.
 
 use super::hilbert;
 use crate::linalg::lanes::{Lanes, Vector, WIDTH};
@@ -283,8 +284,8 @@ impl PointTree {
         })
     }
 
-    /// Appends, in no particular order, the points that for every row `bound` of `bounds` are less than the square root of
-    /// `bound[k]` away from `centres[k]` for some `k`.
+    /// Appends, in no particular order, the points that for every row `bound` of `bounds` are less than the square
+    /// root of `bound[k]` away from `centres[k]` for some `k`.
     #[inline(always)]
     pub(crate) fn contenders<V: Vector>(&self, centres: &[[f64; 3]; 3], bounds: &[[f64; 3]], found: &mut Vec<u32>) {
         self.search::<V>(&mut Contend { centres, bounds, found });
@@ -439,7 +440,8 @@ impl SomePoints {
         }
     }
 
-    /// The nearer of `best`, a squared distance and an index, and these points; the smaller index among equally near ones.
+    /// The nearer of `best`, a squared distance and an index, and these points; the smaller index among equally near
+    /// ones.
     #[inline(always)]
     pub(crate) fn nearest<V: Vector>(&self, x: [f64; 3], mut best: (f64, u32)) -> (f64, u32) {
         let mut lanes = Lanes::ZERO;

@@ -1,7 +1,8 @@
 //! Rays against triangles: the farthest and the nearest hit, by a tree of boxes.
 //!
-//! Guaranteed: the same hits whatever the order of the triangles, up to rounding; triangles without area are never hit. Not
-//! guaranteed: that a ray exactly through an edge hits either of its triangles; the margin that is given makes it hit both.
+//! Guaranteed: the same hits whatever the order of the triangles, up to rounding; triangles without area are never
+//! hit. Not guaranteed: that a ray exactly through an edge hits either of its triangles; the margin that is given
+//! makes it hit both.
 
 use crate::mesh::{TriangleMesh, cross, dot, subtract};
 

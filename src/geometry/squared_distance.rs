@@ -1,11 +1,12 @@
 //! The Voronoi squared distance from a surface to sites, with exact derivatives (Nivoliers, Yan, Lévy 2012).
 //!
-//! `F = sum_i int_(S cap Vor(i)) f_i(x) dx` with `f_i(x) = |A (x - y_i)|^2 + c_i`, over the surface `S` and the Voronoi cells
-//! of the sites `y_i`. `A = I + (s - 1) N N^T` weighs the normal direction by `s`; `N` belongs to the triangle or to the
-//! site. `c_i = w (1 - n_i . N_S)` is the optional normal compatibility, which takes part in the diagram as well.
+//! `F = sum_i int_(S cap Vor(i)) f_i(x) dx` with `f_i(x) = |A (x - y_i)|^2 + c_i`, over the surface `S` and the
+//! Voronoi cells of the sites `y_i`. `A = I + (s - 1) N N^T` weighs the normal direction by `s`; `N` belongs to the
+//! triangle or to the site. `c_i = w (1 - n_i . N_S)` is the optional normal compatibility, which takes part in the
+//! diagram as well.
 //!
-//! With a template's vertices as sites and the target as surface this is `F_(T -> S)`; with samples of the target as sites
-//! and the template as surface it is `F_(S -> T)`.
+//! With a template's vertices as sites and the target as surface this is `F_(T -> S)`; with samples of the target as
+//! sites and the template as surface it is `F_(S -> T)`.
 //!
 //! Derivatives follow the transport theorem rather than the vertices of the diagram: inside a cell the integrand is
 //! differentiated, and across the edge between the cells of `i` and `j`, which moves with normal velocity `v`, the value

@@ -74,7 +74,8 @@ pub fn powf<R: Real>(x: R, exponent: f64) -> R {
     exp(ln(x).scale(exponent))
 }
 
-/// The divided difference `(ln a - ln b) / (a - b)` of positive numbers, `1/a` where they are equal, without cancellation.
+/// The divided difference `(ln a - ln b) / (a - b)` of positive numbers, `1/a` where they are equal, without
+/// cancellation.
 #[inline(always)]
 pub fn ln_divided_difference<R: Real>(a: R, b: R) -> R {
     let sum = a + b;

@@ -1,5 +1,5 @@
-//! Catmull-Clark subdivision as a linear map (Catmull and Clark 1978; creases: DeRose, Kass, Truong 1998; limit positions:
-//! Halstead, Kass, DeRose 1993).
+//! Catmull-Clark subdivision as a linear map (Catmull and Clark 1978; creases: DeRose, Kass, Truong 1998; limit
+//! positions: Halstead, Kass, DeRose 1993).
 //!
 //! Faces may have three or four corners; after one level all have four. Edges at the boundary, edges with three or more
 //! faces and edges that are named as creases stay sharp: they follow the cubic B-spline of their own vertices. Vertices

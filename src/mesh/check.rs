@@ -1,8 +1,8 @@
 //! Validation of meshes before use, and repair of reversed tetrahedra.
 //!
-//! Guarantees: after [`tetrahedra`] without a [`Severity::Error`], every index is in range, every coordinate finite, every
-//! vertex used, every tetrahedron positive, no two are equal, a face has at most two tetrahedra, and these lie on its two
-//! sides. Does not guarantee: that distant parts of the mesh do not intersect each other.
+//! Guarantees: after [`tetrahedra`] without a [`Severity::Error`], every index is in range, every coordinate finite,
+//! every vertex used, every tetrahedron positive, no two are equal, a face has at most two tetrahedra, and these lie
+//! on its two sides. Does not guarantee: that distant parts of the mesh do not intersect each other.
 
 use super::connectivity::{self, CROWDED, Facets, TETRAHEDRON_FACETS};
 use super::quality::scaled_jacobian;

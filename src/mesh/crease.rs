@@ -1,12 +1,14 @@
 //! Creases of a quadrilateral surface: which edges are sharp, and the surface cut open along them.
 //!
-//! [`by_angle`], [`by_label`], [`by_corner_normals`] and [`by_list`] name sharp edges; [`cut`] gives every vertex on a crease one copy for each of the
-//! smooth sides around it. Along a crease the cut surface has a boundary on either side with equal points, so that what is
-//! built over it may have a normal a side, and [`Cut::creases`] tells which boundary edges belong together.
+//! [`by_angle`], [`by_label`], [`by_corner_normals`] and [`by_list`] name sharp edges; [`cut`] gives every vertex on a
+//! crease one copy for each of the smooth sides around it. Along a crease the cut surface has a boundary on either
+//! side with equal points, so that what is built over it may have a normal a side, and [`Cut::creases`] tells which
+//! boundary edges belong together.
 //!
 //! Guarantees: quads keep their order and the order of their corners; the first side of a vertex keeps its number; copies
-//! follow in the order of their vertices. Where a single crease ends within the surface (a dart) the vertex stays whole, so
-//! that the surface is smooth there. Does not guarantee: that an edge is sharp to the eye because it is named.
+//! follow in the order of their vertices. Where a single crease ends within the surface (a dart) the vertex stays
+//! whole, so that the surface is smooth there. Does not guarantee: that an edge is sharp to the eye because it is
+//! named.
 
 use super::connectivity::NONE;
 use super::quadrilateral::{Connectivity, QuadrilateralMesh, quad_and_corner};
@@ -54,8 +56,8 @@ pub fn by_label(connectivity: &Connectivity, labels: &[f64]) -> Vec<bool> {
     marked(connectivity, |first, second| labels[first] != labels[second])
 }
 
-/// Marks inner edges whose quads have normals that differ by more than rounding at one of its ends. `normals` stand at the
-/// corners of `quads`; the quads of `connectivity` are the same, but may run the other way.
+/// Marks inner edges whose quads have normals that differ by more than rounding at one of its ends. `normals` stand at
+/// the corners of `quads`; the quads of `connectivity` are the same, but may run the other way.
 pub fn by_corner_normals(connectivity: &Connectivity, quads: &[[u32; 4]], normals: &[[[f64; 3]; 4]]) -> Vec<bool> {
     let at = |quad: usize, vertex: u32| {
         let corner = quads[quad].iter().position(|&other| other == vertex);

@@ -1,8 +1,9 @@
 //! Volumes of curved cells in the form in which programs exchange them: points on an even lattice in every cell, through
 //! which the cell's polynomial of that order goes (Lagrange form).
 //!
-//! Cells that share an edge or a face share its points where their orders agree. The file formats differ only in the order
-//! in which they list a cell's points; most peel it: corners, edges, faces, then the inside as a cell of lower order.
+//! Cells that share an edge or a face share its points where their orders agree. The file formats differ only in the
+//! order in which they list a cell's points; most peel it: corners, edges, faces, then the inside as a cell of lower
+//! order.
 
 use super::mixed::Shape;
 use std::collections::BTreeMap;

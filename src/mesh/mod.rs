@@ -1,5 +1,5 @@
-//! Meshes in flat arrays: triangle and quadrilateral surfaces, tetrahedral and mixed volumes, their connectivity, generators,
-//! readers and writers.
+//! Meshes in flat arrays: triangle and quadrilateral surfaces, tetrahedral and mixed volumes, their connectivity,
+//! generators, readers and writers.
 //!
 //! Nothing here opens a file: readers take bytes, writers take `std::io::Write`.
 

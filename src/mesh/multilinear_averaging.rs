@@ -1,9 +1,9 @@
-//! Subdivision of volumes by multi-linear averaging (Bajaj, Schaefer, Warren and Xu 2002): every cell is cut at the middles
-//! of its edges, faces and itself into hexahedra, one a corner; then every vertex moves to the mean of the centroids of the
-//! new cells around it.
+//! Subdivision of volumes by multi-linear averaging (Bajaj, Schaefer, Warren and Xu 2002): every cell is cut at the
+//! middles of its edges, faces and itself into hexahedra, one a corner; then every vertex moves to the mean of the
+//! centroids of the new cells around it.
 //!
-//! Features are kept by averaging within the least submanifold that a vertex lies on: cells inside, quads on the boundary,
-//! edges along creases; corners stay. Regular insides tend to the tricubic B-spline.
+//! Features are kept by averaging within the least submanifold that a vertex lies on: cells inside, quads on the
+//! boundary, edges along creases; corners stay. Regular insides tend to the tricubic B-spline.
 //!
 //! Guaranteed: rows of weights sum to 1, and all weights are positive. Not guaranteed: that cells of positive volume stay
 //! so, and smoothness at irregular edges.
@@ -42,8 +42,8 @@ fn normal(points: &[[f64; 3]], face: &Face) -> [f64; 3] {
     sum.map(|coordinate| coordinate / size)
 }
 
-/// Edges of the boundary bent by more than an angle in degrees, and the vertices where other than two of them meet or where
-/// two turn by more than that.
+/// Edges of the boundary bent by more than an angle in degrees, and the vertices where other than two of them meet or
+/// where two turn by more than that.
 pub fn features(mesh: &MixedMesh, topology: &Topology, degrees: f64) -> Features {
     let limit = degrees.to_radians().cos();
     let mut sides: BTreeMap<[u32; 2], Vec<[f64; 3]>> = BTreeMap::new();

@@ -1,12 +1,12 @@
 //! Surfaces of quadrilaterals: points, quads, normals where known, and how the quads hang together.
 //!
-//! [`QuadrilateralMesh::from_content`] takes what a mesh file holds, [`check`] proves it sound, [`Connectivity::of`] lists
-//! its edges with the quads on both sides and the star of every vertex in cyclic order.
+//! [`QuadrilateralMesh::from_content`] takes what a mesh file holds, [`check`] proves it sound, [`Connectivity::of`]
+//! lists its edges with the quads on both sides and the star of every vertex in cyclic order.
 //!
-//! Guarantees: after [`check`] without a [`Severity::Error`], every index is in range, every coordinate finite, every vertex
-//! used, no quad is repeated or has a side without length, an edge has at most two quads, neighbours are oriented alike, and
-//! the quads at a vertex form one fan. Does not guarantee: that quads are planar or convex, or that distant parts do not
-//! intersect each other.
+//! Guarantees: after [`check`] without a [`Severity::Error`], every index is in range, every coordinate finite, every
+//! vertex used, no quad is repeated or has a side without length, an edge has at most two quads, neighbours are
+//! oriented alike, and the quads at a vertex form one fan. Does not guarantee: that quads are planar or convex, or
+//! that distant parts do not intersect each other.
 
 use super::check::{Element, FLAT, Problem, Problems, Severity, counted, elementary};
 use super::connectivity::{NONE, Rows};
@@ -34,8 +34,8 @@ pub enum Triangles {
     Split,
 }
 
-/// The normals in the data of a file's points: a field of three components named `normals` or `normal`, in any case, or three
-/// fields `nx`, `ny`, `nz` as in PLY files.
+/// The normals in the data of a file's points: a field of three components named `normals` or `normal`, in any case,
+/// or three fields `nx`, `ny`, `nz` as in PLY files.
 fn normals(content: &Content) -> Option<Vec<[f64; 3]>> {
     let named = |name: &str, components: usize| {
         let same = |field: &&Field| field.components == components && field.name.eq_ignore_ascii_case(name);
@@ -425,8 +425,8 @@ pub fn orient(quads: &mut [[u32; 4]]) -> Result<usize, usize> {
     Ok(turned)
 }
 
-/// Checks a surface of quadrilaterals and turns quads round that are oriented opposite to their neighbours. Open boundaries
-/// and separate parts are no problems. Errors come first in the list.
+/// Checks a surface of quadrilaterals and turns quads round that are oriented opposite to their neighbours. Open
+/// boundaries and separate parts are no problems. Errors come first in the list.
 pub fn check(mesh: &mut QuadrilateralMesh) -> Vec<Problem> {
     let mut problems = Problems::default();
     if elementary(

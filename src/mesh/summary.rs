@@ -36,7 +36,8 @@ pub struct Summary {
     pub edge_length: Option<Spread>,
 }
 
-/// Sums up a mesh that has no error by [`super::check`], or at least sound indices and coordinates; `None` without points.
+/// Sums up a mesh that has no error by [`super::check`], or at least sound indices and coordinates; `None` without
+/// points.
 pub fn summarize_tetrahedra(mesh: &TetrahedralMesh) -> Option<Summary> {
     let vertices = mesh.points.len();
     let boundary: Boundary = connectivity::boundary(&mesh.cells, vertices);

@@ -1,16 +1,17 @@
-//! Distances between surfaces: the Hausdorff distance both ways, mean and root of mean square (Cignoni, Rocchini, Scopigno
-//! 1998, Metro: measuring error on simplified surfaces).
+//! Distances between surfaces: the Hausdorff distance both ways, mean and root of mean square (Cignoni, Rocchini,
+//! Scopigno 1998, Metro: measuring error on simplified surfaces).
 //!
-//! Every triangle is cut into equal parts whose centres and corners are the samples, so that mean and root of mean square are
-//! quadratures over the area. (Means over all samples of vertices, edges and faces alike, as some programs print them, are
-//! larger: distances are largest along edges, which have no area.) The largest distance is then hunted down by branch and bound from the largest sample: the
-//! distance to one triangle is convex, so over a piece of surface it is largest at a corner, and the least of these over a
-//! few near triangles bounds the distance to the whole surface.
+//! Every triangle is cut into equal parts whose centres and corners are the samples, so that mean and root of mean
+//! square are quadratures over the area. (Means over all samples of vertices, edges and faces alike, as some programs
+//! print them, are larger: distances are largest along edges, which have no area.) The largest distance is then hunted
+//! down by branch and bound from the largest sample: the distance to one triangle is convex, so over a piece of
+//! surface it is largest at a corner, and the least of these over a few near triangles bounds the distance to the
+//! whole surface.
 //!
-//! Guaranteed: `max <= true maximum <= bound`, up to rounding; `bound - max` is at most the tolerance unless the budget of
-//! a triangle ran out, which `bound` then shows; the same input gives the same bits with any number of threads. Where a
-//! sample comes near the maximum, the maximum is exact to a thousandth. Not guaranteed: anything about orientation or
-//! connectivity, which play no part.
+//! Guaranteed: `max <= true maximum <= bound`, up to rounding; `bound - max` is at most the tolerance unless the
+//! budget of a triangle ran out, which `bound` then shows; the same input gives the same bits with any number of
+//! threads. Where a sample comes near the maximum, the maximum is exact to a thousandth. Not guaranteed: anything
+//! about orientation or connectivity, which play no part.
 
 use super::{Better, Metric};
 use crate::geometry::closest_point::{ClosestPoint, Nearest};
@@ -266,8 +267,8 @@ pub fn one_sided(surface: &TriangleMesh, to: &ClosestPoint, sampling: Sampling) 
     }
 }
 
-/// How many parts the edges of a triangle are divided into. Slivers have longer parts than the spacing asks for, so that no
-/// triangle has many more samples than its area asks for.
+/// How many parts the edges of a triangle are divided into. Slivers have longer parts than the spacing asks for, so
+/// that no triangle has many more samples than its area asks for.
 fn parts(longest: f64, area_vector: [f64; 3], spacing: f64) -> usize {
     let side = (0.5 * length(area_vector)).sqrt();
     let most = ((SLENDER * side / spacing).ceil() as usize).clamp(FEW_PARTS, PARTS);
@@ -291,8 +292,8 @@ fn affordable(surface: &TriangleMesh, spacing: f64) -> f64 {
     spacing * (samples / SAMPLES).max(1.0).sqrt()
 }
 
-/// Samples a chunk of triangles at the centres and corners of their parts. Centres weigh 3/4 and corners 1/12, which is exact
-/// for quadratic polynomials.
+/// Samples a chunk of triangles at the centres and corners of their parts. Centres weigh 3/4 and corners 1/12, which
+/// is exact for quadratic polynomials.
 fn sample(
     surface: &TriangleMesh,
     triangles: &[[u32; 3]],

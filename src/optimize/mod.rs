@@ -1,6 +1,7 @@
 //! Minimizers: what they ask of an objective, what they tell an observer, and why they stop.
 //!
-//! A failed line search is a stop reason, never a warning. Nothing here reads a clock: limits arrive through the observer.
+//! A failed line search is a stop reason, never a warning. Nothing here reads a clock: limits arrive through the
+//! observer.
 
 pub mod line_search;
 pub mod newton;
@@ -71,7 +72,8 @@ pub trait Objective {
     fn value(&mut self, x: &[f64]) -> f64;
     /// Writes the gradient at `x` and returns the value. Where the value is not finite the gradient is not used.
     fn gradient(&mut self, x: &[f64], gradient: &mut [f64]) -> f64;
-    /// The largest `t` for which `x + s direction` is certain to stay in the domain for all `s < t`; infinite when unknown.
+    /// The largest `t` for which `x + s direction` is certain to stay in the domain for all `s < t`; infinite when
+    /// unknown.
     fn max_step(&mut self, _x: &[f64], _direction: &[f64]) -> f64 {
         f64::INFINITY
     }

@@ -1,7 +1,7 @@
 //! What a run leaves for its reader: tables, rates, plots, pictures, verdicts and one self-contained page.
 //!
-//! The report is made from the experiment and its records alone. The same records give the same bytes: no clock is read, and
-//! the only times are recorded ones. Every file is published whole or not at all.
+//! The report is made from the experiment and its records alone. The same records give the same bytes: no clock is
+//! read, and the only times are recorded ones. Every file is published whole or not at all.
 
 pub mod compare;
 pub mod gate;
@@ -60,8 +60,8 @@ pub struct Written {
     pub verdicts: Vec<gate::Verdict>,
 }
 
-/// Writes everything into `folder`, which is made where it is missing. `planned` is the number of jobs of the experiment, of
-/// which `rows` are those with a record.
+/// Writes everything into `folder`, which is made where it is missing. `planned` is the number of jobs of the
+/// experiment, of which `rows` are those with a record.
 pub fn write(experiment: &Experiment, rows: &[Row], planned: usize, folder: &Path) -> Result<Written, ReportError> {
     std::fs::create_dir_all(folder).map_err(|error| ReportError::Write(folder.into(), error))?;
     let mut files = Vec::new();

@@ -1,8 +1,8 @@
 //! Rates of convergence: the slope of log y against log x by least squares, with its uncertainty.
 //!
 //! The standard error is that of ordinary least squares with equal variances: s / sqrt(sum (log x - mean)^2) with
-//! s^2 = sum of squared residuals / (n - 2). It says how well a line describes the points, not whether they are asymptotic:
-//! the rate of the last pair tells that.
+//! s^2 = sum of squared residuals / (n - 2). It says how well a line describes the points, not whether they are
+//! asymptotic: the rate of the last pair tells that.
 
 use super::row::{Row, label};
 use crate::experiment::file::{Bound, Experiment, Rate};

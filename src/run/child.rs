@@ -11,7 +11,8 @@ use std::time::{Duration, Instant};
 
 /// After the soft limit, which the process itself keeps, the process is killed.
 pub(super) const GRACE: Duration = Duration::from_secs(1);
-/// The phase in which a method measures what it has, also after the soft limit: a result that is there is not thrown away.
+/// The phase in which a method measures what it has, also after the soft limit: a result that is there is not thrown
+/// away.
 const MEASURING: &str = "measure";
 /// It takes a quarter of the limit at most, or this.
 const LEAST_FOR_MEASURING: Duration = Duration::from_secs(10);

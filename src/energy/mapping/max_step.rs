@@ -2,8 +2,8 @@
 
 use crate::linalg::elementary::powf;
 
-/// The smaller of `least` and the smallest positive root of `p(t) = 1 + a t + b t^2 + c t^3`; 0 where a coefficient is not
-/// finite.
+/// The smaller of `least` and the smallest positive root of `p(t) = 1 + a t + b t^2 + c t^3`; 0 where a coefficient is
+/// not finite.
 pub fn smallest_positive_root(a: f64, b: f64, c: f64, least: f64) -> f64 {
     if !(a.is_finite() && b.is_finite() && c.is_finite()) {
         return 0.0;

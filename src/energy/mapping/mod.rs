@@ -337,8 +337,8 @@ impl MappingEnergy {
 
     /// The energy, its derivative, and its second derivative as ten row-major 3x3 blocks a tetrahedron, those of the
     /// vertices [`BLOCK_PAIRS`]: `blocks[90 cell + 9 pair + 3 i + j] = d2E / du_ai du_bj`. The 12x12 matrix of every
-    /// tetrahedron is projected to a positive one, see [`MappingEnergy::set_negative_part`]. Unspecified where the energy is
-    /// not finite.
+    /// tetrahedron is projected to a positive one, see [`MappingEnergy::set_negative_part`]. Unspecified where the
+    /// energy is not finite.
     pub fn hessian(&self, positions: &[f64], gradient: &mut [f64], blocks: &mut [f64]) -> f64 {
         assert_eq!(positions.len(), 3 * self.vertices, "three coordinates a vertex");
         assert_eq!(gradient.len(), 3 * self.vertices, "three coordinates a vertex");
@@ -384,9 +384,9 @@ impl MappingEnergy {
             });
     }
 
-    /// The smallest positive t at which a tetrahedron of `positions + t direction` is flat; infinity if none ever is, 0 if
-    /// one is flat already or a coordinate is not finite. Exact up to rounding, so callers stay below it and look at the
-    /// value again.
+    /// The smallest positive t at which a tetrahedron of `positions + t direction` is flat; infinity if none ever is,
+    /// 0 if one is flat already or a coordinate is not finite. Exact up to rounding, so callers stay below it and look
+    /// at the value again.
     pub fn max_step(&self, positions: &[f64], direction: &[f64]) -> f64 {
         assert_eq!(positions.len(), 3 * self.vertices, "three coordinates a vertex");
         assert_eq!(direction.len(), 3 * self.vertices, "three coordinates a vertex");

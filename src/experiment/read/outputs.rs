@@ -238,8 +238,9 @@ fn series(checker: &mut Checker, found: &Entries<'_>, context: &Context<'_>, x: 
     }
 }
 
-/// The axes that refine towards `x`, which therefore tell no series apart: `x` itself and what is zipped with it; where `x` is no
-/// axis but a figure such as an edge length, the models' numbers, save seeds, and what is zipped with them.
+/// The axes that refine towards `x`, which therefore tell no series apart: `x` itself and what is zipped with it;
+/// where `x` is no axis but a figure such as an edge length, the models' numbers, save seeds, and what is zipped with
+/// them.
 fn refining(axes: &Axes, x: &str) -> Vec<String> {
     let measured = axes.find(x).is_none();
     let refines = |axis: &&Known| {
@@ -260,8 +261,8 @@ fn numeric(axis: &Known) -> bool {
     !values.is_empty() && values.iter().all(Value::is_number)
 }
 
-/// Warns when a series joins jobs that differ in more than what refines them. Numbers may refine towards a measured x, and
-/// seeds are spread.
+/// Warns when a series joins jobs that differ in more than what refines them. Numbers may refine towards a measured x,
+/// and seeds are spread.
 fn mingled(
     checker: &mut Checker,
     found: &Entries<'_>,

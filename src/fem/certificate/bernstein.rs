@@ -2,10 +2,9 @@
 //!
 //! On lattices the inverse of the collocation matrix is written down rather than computed, since the error of an LU
 //! factorization grows with the square of its norm. With barycentric coordinates l of a simplex the Lagrange function of
-//! the lattice point `a / n` is `prod_i (n l_i) (n l_i - 1) ... (n l_i - a_i + 1) / a_i!`; expanded by Stirling numbers s and
-//! raised to degree n, its Bernstein coefficient b is
-//! `prod_i b_i! / n! sum_k (n - |k|)! prod_i s(a_i, k_i) n^k_i / (a_i! (b_i - k_i)!)`.
-//! The sum cancels, hence twice the digits.
+//! the lattice point `a / n` is `prod_i (n l_i) (n l_i - 1) ... (n l_i - a_i + 1) / a_i!`; expanded by Stirling
+//! numbers s and raised to degree n, its Bernstein coefficient b is `prod_i b_i! / n! sum_k (n - |k|)! prod_i s(a_i,
+//! k_i) n^k_i / (a_i! (b_i - k_i)!)`. The sum cancels, hence twice the digits.
 
 use super::double_double::DoubleDouble;
 use nalgebra::DMatrix;

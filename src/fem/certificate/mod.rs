@@ -12,8 +12,8 @@
 //! triangles and tetrahedra at lattices, with an explicit bound on the error ([`chebyshev`]) that is subtracted from the
 //! control matrices' symmetric parts.
 //!
-//! Rounding is covered by a margin that grows with the conditioning of the conversion to Bernstein form; it is an estimate,
-//! not interval arithmetic.
+//! Rounding is covered by a margin that grows with the conditioning of the conversion to Bernstein form; it is an
+//! estimate, not interval arithmetic.
 
 mod double_double;
 mod bernstein;
@@ -175,8 +175,8 @@ impl Certifier {
         }
     }
 
-    /// Whether the determinant is proved positive on a part from the control matrices there, each wrong by at most `error`
-    /// in the Frobenius norm: a positive lower bound, or as an error one that is not.
+    /// Whether the determinant is proved positive on a part from the control matrices there, each wrong by at most
+    /// `error` in the Frobenius norm: a positive lower bound, or as an error one that is not.
     fn part(&self, control: &mut [Columns<f64>], error: f64, inverse: &Columns<f64>) -> Result<f64, f64> {
         let mut mean = [[0.0; 3]; 3];
         for matrix in control.iter_mut() {

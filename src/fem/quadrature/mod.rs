@@ -2,9 +2,9 @@
 //!
 //! Exactness for `n` points a direction: Gauss for every variable of a hexahedron up to degree `2n - 1`, and for total
 //! degree `2n - 1` in triangles and tetrahedra (collapsed Gauss-Jacobi points); Lobatto up to degree `2n - 3` a variable,
-//! but in triangles and tetrahedra, where it is Gauss with a tenth of the lattice's vertex rule, for linear functions only;
-//! the trapezoid rule for linear functions, and for products of two of the
-//! cosines `cos(j pi x)` with `j + k < 2 (n - 1)`.
+//! but in triangles and tetrahedra, where it is Gauss with a tenth of the lattice's vertex rule, for linear functions
+//! only; the trapezoid rule for linear functions, and for products of two of the cosines `cos(j pi x)` with `j + k < 2
+//! (n - 1)`.
 
 pub mod line;
 pub mod simplex;

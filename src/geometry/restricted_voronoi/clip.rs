@@ -1,13 +1,14 @@
 //! The restricted cells within one triangle, as the lower envelope of affine functions.
 //!
-//! On the triangle's plane the squared distance to a site differs from that to a reference site by an affine function, the
-//! site's *height function* `W_i`. The cell of site `i` is where `W_i` is smallest: a convex polygon, cut from the triangle
-//! by the lines `W_i = W_j`. A constant added to a squared distance (a power diagram) changes nothing in this.
+//! On the triangle's plane the squared distance to a site differs from that to a reference site by an affine function,
+//! the site's *height function* `W_i`. The cell of site `i` is where `W_i` is smallest: a convex polygon, cut from the
+//! triangle by the lines `W_i = W_j`. A constant added to a squared distance (a power diagram) changes nothing in
+//! this.
 //!
-//! A polygon starts as the whole triangle. At a vertex where another height function is lower than the owner's, the lowest
-//! one cuts the polygon; when no vertex is left with a lower one, the polygon is the cell, by convexity. Finding the lowest
-//! of eight functions takes a handful of vector instructions, so that no order of the neighbours and no security radius is
-//! needed.
+//! A polygon starts as the whole triangle. At a vertex where another height function is lower than the owner's, the
+//! lowest one cuts the polygon; when no vertex is left with a lower one, the polygon is the cell, by convexity.
+//! Finding the lowest of eight functions takes a handful of vector instructions, so that no order of the neighbours
+//! and no security radius is needed.
 
 use super::frame::Frame;
 use crate::linalg::lanes::{Lanes, Vector, WIDTH};
@@ -85,8 +86,8 @@ impl Heights {
         std::array::from_fn(|k| group[k].0[index % WIDTH])
     }
 
-    /// Whether function `i` is lowest in the middle of a polygon. A polygon that was cut by some of the functions only may
-    /// belong to one that is nowhere lowest.
+    /// Whether function `i` is lowest in the middle of a polygon. A polygon that was cut by some of the functions only
+    /// may belong to one that is nowhere lowest.
     #[inline(always)]
     pub(super) fn owns<V: Vector>(&self, polygon: &[Corner], i: usize, tolerance: f64) -> bool {
         let share = 1.0 / polygon.len() as f64;

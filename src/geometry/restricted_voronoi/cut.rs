@@ -2,8 +2,8 @@
 //!
 //! There are three ways to the parts, each for what the one before leaves. All cells are walked at once along their edges
 //! ([`super::envelope`]). Where rounding breaks the walk, cells are cut one by one ([`super::clip`]). Where they then
-//! overlap or leave gaps, which their areas betray, they are cut by exact decisions ([`super::exact`]). Triangles with many
-//! candidates are not walked, and subdivided before they are cut ([`super::subdivide`]).
+//! overlap or leave gaps, which their areas betray, they are cut by exact decisions ([`super::exact`]). Triangles with
+//! many candidates are not walked, and subdivided before they are cut ([`super::subdivide`]).
 
 use super::clip::{Candidate, Clipper, Corner, Heights, Polygons};
 use super::envelope::Envelope;

@@ -4,9 +4,9 @@
 //! another function becomes as low as the owner's first: one quotient a function, taken eight by eight. Every vertex is
 //! found once and tells three cells, so that no polygon is cut again and again.
 //!
-//! Cells are convex, so two of them share one edge at most. Rounding that breaks the combinatorics therefore shows: an edge
-//! ends twice, a cell's border does not close, or a cell turns the wrong way. The walk then gives up, and the caller cuts
-//! the cells one by one.
+//! Cells are convex, so two of them share one edge at most. Rounding that breaks the combinatorics therefore shows: an
+//! edge ends twice, a cell's border does not close, or a cell turns the wrong way. The walk then gives up, and the
+//! caller cuts the cells one by one.
 
 use super::clip::{Corner, Heights, Polygons, SETTLED};
 use super::frame::Frame;

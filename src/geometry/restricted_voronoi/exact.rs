@@ -1,11 +1,11 @@
-//! The restricted cells within one triangle with exact decisions, for triangles that rounding would spoil: triangles in or
-//! near a bisector, sites far away, crowded vertices.
+//! The restricted cells within one triangle with exact decisions, for triangles that rounding would spoil: triangles
+//! in or near a bisector, sites far away, crowded vertices.
 //!
 //! The three values of a height function at the triangle's corners are taken as given numbers, which makes it a point of
-//! dual space. Whether one function is lower than another at a corner is then a comparison; where two functions meet on an
-//! edge, an orientation of three points in the plane; where three functions meet, an orientation of four points in space.
-//! All are decided exactly (Shewchuk 1997, crate `robust`). Equal values are told apart by the functions' order, so that
-//! equal functions do not share a cell. Only the places of the vertices are rounded.
+//! dual space. Whether one function is lower than another at a corner is then a comparison; where two functions meet
+//! on an edge, an orientation of three points in the plane; where three functions meet, an orientation of four points
+//! in space. All are decided exactly (Shewchuk 1997, crate `robust`). Equal values are told apart by the functions'
+//! order, so that equal functions do not share a cell. Only the places of the vertices are rounded.
 
 use super::clip::{Corner, Mark};
 use super::frame::Frame;
@@ -65,8 +65,8 @@ fn sign(own: [f64; 3], x: [f64; 3], entering: Mark, leaving: Mark, duals: &dyn F
 }
 
 impl ExactClipper {
-    /// The polygon of function `i` of `duals`, counter-clockwise; empty when it owns nothing. Of equal functions the first
-    /// one owns. `rivals` are the functions that cut.
+    /// The polygon of function `i` of `duals`, counter-clockwise; empty when it owns nothing. Of equal functions the
+    /// first one owns. `rivals` are the functions that cut.
     pub(super) fn cell(&mut self, frame: &Frame, duals: &[[f64; 3]], i: usize, rivals: &[u32]) -> &[Corner] {
         self.result.clear();
         self.polygon.clear();

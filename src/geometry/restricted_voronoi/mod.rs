@@ -2,12 +2,13 @@
 //!
 //! Every triangle is cut into the parts of it that are nearest to one site (Yan, Lévy, Liu, Sun, Wang 2009). The surface
 //! may be a soup: triangles are treated one by one. For a triangle, the candidates are the sites that come closer than a
-//! reference site to one of its vertices; no other site owns a part of it, because the difference of two squared distances
-//! is affine. A triangle whose three vertices share the nearest site lies in one cell, since cells are convex.
+//! reference site to one of its vertices; no other site owns a part of it, because the difference of two squared
+//! distances is affine. A triangle whose three vertices share the nearest site lies in one cell, since cells are
+//! convex.
 //!
 //! Guaranteed: the same pieces in the same order with any number of threads; the areas of a triangle's pieces sum to its
-//! area up to 1e-10 of it and 1e-14 of its squared diameter, and where even exact decisions do not achieve that the triangle
-//! is counted ([`Ways::gaps`]). Triangles without area have no pieces. Of several sites in one place the one
+//! area up to 1e-10 of it and 1e-14 of its squared diameter, and where even exact decisions do not achieve that the
+//! triangle is counted ([`Ways::gaps`]). Triangles without area have no pieces. Of several sites in one place the one
 //! with the smallest index has a cell.
 //!
 //! Optionally a site's squared distance to a triangle is increased by `w (1 - n . N)` with the site's normal `n` and the
@@ -149,8 +150,8 @@ struct Scratch {
     cutter: Cutter,
 }
 
-/// The connectivity of a surface, and memory for diagrams restricted to it. Made once, used for any number of positions of
-/// its vertices and any number of sites.
+/// The connectivity of a surface, and memory for diagrams restricted to it. Made once, used for any number of
+/// positions of its vertices and any number of sites.
 #[derive(Debug)]
 pub struct RestrictedVoronoi {
     cells: Vec<[u32; 3]>,
@@ -218,8 +219,8 @@ impl RestrictedVoronoi {
         self.order.len().div_ceil(CHUNK)
     }
 
-    /// Calls `visit` for every piece, in a fixed order, and counts the ways that were gone. Nothing is visited unless there
-    /// are sites and all coordinates are finite.
+    /// Calls `visit` for every piece, in a fixed order, and counts the ways that were gone. Nothing is visited unless
+    /// there are sites and all coordinates are finite.
     ///
     /// # Panics
     /// When there are not as many points as at the preparation, or not as many normals as sites.

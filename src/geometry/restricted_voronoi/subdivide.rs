@@ -1,9 +1,10 @@
 //! Rivals of every candidate in a triangle that many sites share.
 //!
 //! The triangle is divided into four again and again, until few functions can be lowest on a part: a function that is
-//! nowhere lower than another at the part's corners is not lowest on it. Two functions whose cells share an edge meet in a
-//! part where both remain, so the functions that remain together anywhere are all that need to be cut with each other. A
-//! function that remains without being lowest anywhere is told by its polygon's middle, where another one is lower.
+//! nowhere lower than another at the part's corners is not lowest on it. Two functions whose cells share an edge meet
+//! in a part where both remain, so the functions that remain together anywhere are all that need to be cut with each
+//! other. A function that remains without being lowest anywhere is told by its polygon's middle, where another one is
+//! lower.
 
 use super::clip::Heights;
 use super::frame::Frame;
@@ -13,8 +14,9 @@ use std::ops::Range;
 const FEW: usize = 16;
 /// Parts of this depth are not divided: what remains meets in a point, up to rounding.
 const DEPTH: u32 = 24;
-/// Functions that meet along a line, or are one but for rounding, remain together in every part there, however small. After
-/// so many divisions that left most functions in two children a part is not divided; one with four children counts twice.
+/// Functions that meet along a line, or are one but for rounding, remain together in every part there, however small.
+/// After so many divisions that left most functions in two children a part is not divided; one with four children
+/// counts twice.
 const VAIN: f64 = 4.0;
 
 #[derive(Debug, Default)]

@@ -1,8 +1,8 @@
 //! Numeric multifrontal factorization `L J L^T` and the triangular solves.
 //!
-//! `J` is the identity for positive definite matrices, a Cholesky factorization. Symmetric indefinite matrices whose pivots
-//! have known signs in every order of the vertices, such as those of saddle points with a vertex's unknowns kept together,
-//! need no pivoting either: `J` holds the signs.
+//! `J` is the identity for positive definite matrices, a Cholesky factorization. Symmetric indefinite matrices whose
+//! pivots have known signs in every order of the vertices, such as those of saddle points with a vertex's unknowns
+//! kept together, need no pivoting either: `J` holds the signs.
 
 use super::dense::{factorize_columns, times_signs, update_rectangle, update_triangle};
 use super::elimination::{Elimination, strip_start, strip_width};

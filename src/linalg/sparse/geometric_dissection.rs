@@ -1,9 +1,10 @@
-//! Order of elimination by nested dissection with planes: faster than by the graph alone, for meshes that fill their space
-//! evenly.
+//! Order of elimination by nested dissection with planes: faster than by the graph alone, for meshes that fill their
+//! space evenly.
 //!
-//! The vertices are halved by their coordinate along the longest axis of their box; those of one half that have neighbours
-//! in the other separate them, of the two choices the smaller. For graphs whose edges are as short as those of a mesh, or of
-//! a mesh whose neighbours' neighbours are joined too, separators are about as small as straight cuts can be.
+//! The vertices are halved by their coordinate along the longest axis of their box; those of one half that have
+//! neighbours in the other separate them, of the two choices the smaller. For graphs whose edges are as short as those
+//! of a mesh, or of a mesh whose neighbours' neighbours are joined too, separators are about as small as straight cuts
+//! can be.
 
 use super::graph::Graph;
 use super::nested_dissection::{LEAF, leaf};

@@ -185,8 +185,9 @@ impl<const B: usize> BlockPattern<B> {
         })
     }
 
-    /// The structure over the vertices of a graph, all free, in an order of elimination: entry `k` of `order` is the vertex
-    /// to be eliminated `k`-th. Its matrices are filled block by block ([`block`](Self::block)), not from cells.
+    /// The structure over the vertices of a graph, all free, in an order of elimination: entry `k` of `order` is the
+    /// vertex to be eliminated `k`-th. Its matrices are filled block by block ([`block`](Self::block)), not from
+    /// cells.
     pub fn of_graph(graph: &Graph, order: &[u32]) -> Self {
         let elimination = Elimination::new(graph, order, B);
         let count = graph.len();
@@ -235,8 +236,8 @@ impl<const B: usize> BlockPattern<B> {
         }
     }
 
-    /// Where a matrix holds the block of two free vertices: the index of its first scalar, and whether the block there is the
-    /// one with `row` and `column` exchanged. `None` where the structure has no such block.
+    /// Where a matrix holds the block of two free vertices: the index of its first scalar, and whether the block there
+    /// is the one with `row` and `column` exchanged. `None` where the structure has no such block.
     pub fn block(&self, row: usize, column: usize) -> Option<(usize, bool)> {
         let (row, column) = (self.position[row], self.position[column]);
         let (low, high) = (row.min(column) as usize, row.max(column));

@@ -1,8 +1,8 @@
 //! MEDIT's ASCII `.mesh`: sections of vertices and cells, indices from 1, an integer reference after each.
 //!
 //! Accepted: version and dimension on the keyword's line or the next, any order of sections, comments after `#`, two
-//! dimensions (z becomes 0, with a notice), a missing `End`. Sections that [`Content`] cannot hold are left out with a notice.
-//! Reference: P. Frey, "MEDIT: An interactive mesh visualization software", INRIA RT-0253, 2001, section 7.
+//! dimensions (z becomes 0, with a notice), a missing `End`. Sections that [`Content`] cannot hold are left out with a
+//! notice. Reference: P. Frey, "MEDIT: An interactive mesh visualization software", INRIA RT-0253, 2001, section 7.
 
 use super::cells::Sorter;
 use super::text::{Text, same, shown};

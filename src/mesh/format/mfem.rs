@@ -1,7 +1,7 @@
 //! MFEM's text mesh: sections of elements, boundary and vertices, indices from 0, an attribute before each cell.
 //!
-//! Accepted: versions 1.0 to 1.3 without curved nodes; a curved mesh (`nodes`) is refused, because its corners alone would be
-//! another shape. Points and segments are left out with a notice. Reference: mfem.org, "MFEM mesh formats".
+//! Accepted: versions 1.0 to 1.3 without curved nodes; a curved mesh (`nodes`) is refused, because its corners alone
+//! would be another shape. Points and segments are left out with a notice. Reference: mfem.org, "MFEM mesh formats".
 
 use super::cells::Sorter;
 use super::text::{Text, same, shown};
@@ -118,8 +118,8 @@ pub(super) fn read(bytes: &[u8]) -> Result<Content, Fault> {
     sorter.finish(points, Vec::new(), cell_data)
 }
 
-/// Writes version 1.0: volume cells as elements and surface cells as boundary, or surface cells as elements where there are
-/// no others; the field `reference` becomes the attributes.
+/// Writes version 1.0: volume cells as elements and surface cells as boundary, or surface cells as elements where
+/// there are no others; the field `reference` becomes the attributes.
 pub(super) fn write(content: &Content) -> Result<Written, String> {
     let mut out = Vec::with_capacity(64 * content.points.len() + 32 * content.cells().count() + 256);
     let labels = reference_labels(&content.cell_data);

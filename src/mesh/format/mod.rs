@@ -42,8 +42,8 @@ pub struct Field {
 ///
 /// Corners are numbered as in VTK and Gmsh: a tetrahedron (0,1,2,3) is positive when `det[x1-x0, x2-x0, x3-x0] > 0`; a
 /// hexahedron lists its bottom quad, then the top one; a prism its bottom triangle, then the top one; a pyramid its base,
-/// then the apex. Some VTK files, by an older reading of its guide, have the prism's triangles the other way round; they are
-/// kept as they are.
+/// then the apex. Some VTK files, by an older reading of its guide, have the prism's triangles the other way round;
+/// they are kept as they are.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Content {
     /// In the units of the file.

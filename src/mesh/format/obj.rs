@@ -2,8 +2,8 @@
 //!
 //! Vertices keep the order of the file, also those that no face uses; negative indices count back from the last vertex.
 //! Polygons with more than four corners become fans, with a notice. Normals become the point field `normals`, where faces
-//! name them: the sum over a vertex's corners, zero where there are none. Texture coordinates, colours, groups and materials
-//! are left out silently, as they do not shape the mesh; lines, points and free forms with a notice.
+//! name them: the sum over a vertex's corners, zero where there are none. Texture coordinates, colours, groups and
+//! materials are left out silently, as they do not shape the mesh; lines, points and free forms with a notice.
 
 use super::cells::Sorter;
 use super::text::{Text, parse_real, shown};
@@ -308,8 +308,8 @@ fn read_normals(bytes: &[u8], vertices: usize) -> Result<Vec<Field>, Fault> {
     }])
 }
 
-/// The normals that the corners of an OBJ file's faces name, quad by quad; nothing when a face is no quad or a corner names no
-/// normal of the file. The file must have been [read](super::read) before.
+/// The normals that the corners of an OBJ file's faces name, quad by quad; nothing when a face is no quad or a corner
+/// names no normal of the file. The file must have been [read](super::read) before.
 pub fn quad_corner_normals(bytes: &[u8]) -> Option<Vec<[[f64; 3]; 4]>> {
     let mut text = Text::new(bytes, None);
     let mut normals: Vec<[f64; 3]> = Vec::new();

@@ -1,9 +1,8 @@
 //! OFF, Geomview's object file format, in text.
 //!
 //! Header words `OFF`, `COFF`, `NOFF`, `STOFF` and their combinations are read, also with the counts on their line, or no
-//! header word at all; colours, normals and texture coordinates are left out. Comments follow `#`. Polygons with more than
-//! four corners become fans, with a notice.
-//! Source: the Geomview manual 1.9, section 4.2.5, "OFF files".
+//! header word at all; colours, normals and texture coordinates are left out. Comments follow `#`. Polygons with more
+//! than four corners become fans, with a notice. Source: the Geomview manual 1.9, section 4.2.5, "OFF files".
 
 use super::cells::Sorter;
 use super::text::{Text, shown};

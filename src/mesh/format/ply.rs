@@ -1,9 +1,8 @@
 //! PLY, ASCII and binary in either byte order, with any further properties.
 //!
-//! Scalar properties of vertices beyond the coordinates become fields of points, those of faces fields of cells. Lists other
-//! than the corners, and elements other than vertices and faces, are left out with a notice. Written: binary,
-//! little-endian, double precision.
-//! Source: G. Turk, "The PLY Polygon File Format", Stanford, 1994.
+//! Scalar properties of vertices beyond the coordinates become fields of points, those of faces fields of cells. Lists
+//! other than the corners, and elements other than vertices and faces, are left out with a notice. Written: binary,
+//! little-endian, double precision. Source: G. Turk, "The PLY Polygon File Format", Stanford, 1994.
 
 use super::binary::{Order, Scalar};
 use super::cells::Sorter;

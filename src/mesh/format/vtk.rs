@@ -1,9 +1,9 @@
 //! VTK's numbers for kinds of cells, and its legacy format `.vtk`.
 //!
-//! Read: unstructured grids and polygonal data, ASCII and binary, cells in the layout of files up to version 4 and in that
-//! of version 5 (offsets and connectivity); scalars, vectors, normals, tensors, texture coordinates and fields as data.
-//! Written: version 3.0, ASCII, unstructured grid.
-//! Source: the VTK user's guide, 11th edition, section 19.3, "Simple legacy formats", and the note "VTK legacy file version 5.1".
+//! Read: unstructured grids and polygonal data, ASCII and binary, cells in the layout of files up to version 4 and in
+//! that of version 5 (offsets and connectivity); scalars, vectors, normals, tensors, texture coordinates and fields as
+//! data. Written: version 3.0, ASCII, unstructured grid. Source: the VTK user's guide, 11th edition, section 19.3,
+//! "Simple legacy formats", and the note "VTK legacy file version 5.1".
 
 use super::binary::{Order, Scalar};
 use super::cells::Sorter;

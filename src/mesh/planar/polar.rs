@@ -134,8 +134,8 @@ fn annulus(family: Family, cells: usize) -> Result<(Planar, Vec<usize>), String>
     Ok((Planar { mesh, inside: within }, starts))
 }
 
-/// Moves the points at random and triangulates anew. The points of the `marked` rings stay on their circles; the first and
-/// the last of them bound the domain, the two in the middle (or the one) the inner domain.
+/// Moves the points at random and triangulates anew. The points of the `marked` rings stay on their circles; the first
+/// and the last of them bound the domain, the two in the middle (or the one) the inner domain.
 fn moved(
     mesh: &TriangleMesh,
     starts: &[usize],

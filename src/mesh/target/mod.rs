@@ -254,8 +254,8 @@ fn unit_cube(surface: &Surface, arguments: &Arguments) -> Result<Vec<[f64; 3]>, 
     )
 }
 
-/// Moves vertices within the sides of the unit cube until no triangle is inverted, if it can: a disturbance that is one to
-/// one for points may be more than large triangles can follow.
+/// Moves vertices within the sides of the unit cube until no triangle is inverted, if it can: a disturbance that is
+/// one to one for points may be more than large triangles can follow.
 ///
 /// Only vertices of poor triangles (shape below 0.05) move, each to where the smallest shape around it is largest, by a
 /// search along the two axes of its side with falling steps.

@@ -1,15 +1,16 @@
 //! Tangents and slopes of normals found together, so that neither goes far to spare the other.
 //!
 //! Unknown are the tangents `t` of all curves in their planes and, at every curve end, the two free numbers of the slope
-//! `b = -k t + s n x t + v n` (see [`edge_normals`](super::edge_normals)). Conditions are `s_i + s_j = (k_i - k_j) cot a_ij`
-//! at every corner of a quad and `X'.N = 0` at 1/3 and 2/3 of every curve; the enclosure condition is the alternating sum of
-//! the first kind around a vertex. Tangents that meet the enclosure condition alone can leave a curve whose two equations
-//! for its two `v` are all but singular (every arc that is symmetric and shallow), so that `v` grows without bound and the
-//! surface folds. Here the sum of `w |t - t_natural|^2 / |d|^2 + (s |t|)^2 + v^2` is made small under all conditions, with
-//! `d` the chord, by Newton's method with steps `y = J^T (J J^T)^-1 (J y - c)` in the scaled unknowns `y`.
+//! `b = -k t + s n x t + v n` (see [`edge_normals`](super::edge_normals)). Conditions are `s_i + s_j = (k_i - k_j) cot
+//! a_ij` at every corner of a quad and `X'.N = 0` at 1/3 and 2/3 of every curve; the enclosure condition is the
+//! alternating sum of the first kind around a vertex. Tangents that meet the enclosure condition alone can leave a
+//! curve whose two equations for its two `v` are all but singular (every arc that is symmetric and shallow), so that
+//! `v` grows without bound and the surface folds. Here the sum of `w |t - t_natural|^2 / |d|^2 + (s |t|)^2 + v^2` is
+//! made small under all conditions, with `d` the chord, by Newton's method with steps `y = J^T (J J^T)^-1 (J y - c)`
+//! in the scaled unknowns `y`.
 //!
-//! An edge's unknowns stand in six conditions: four corners and its own two. The latter are eliminated edge by edge, which
-//! leaves a sparse positive semidefinite system over the corners.
+//! An edge's unknowns stand in six conditions: four corners and its own two. The latter are eliminated edge by edge,
+//! which leaves a sparse positive semidefinite system over the corners.
 //!
 //! Guaranteed: tangents stay in the tangent planes. Not guaranteed: the least sum of all; that the conditions can be met:
 //! the residual tells.
@@ -307,8 +308,8 @@ fn inner(a: &[f64; UNKNOWNS], b: &[f64; UNKNOWNS]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-/// The inverse of the block of an edge's own two conditions, with a small shift where the curve is straight; zero for edges
-/// that may not change.
+/// The inverse of the block of an edge's own two conditions, with a small shift where the curve is straight; zero for
+/// edges that may not change.
 fn inverse(edge: &Edge) -> [[f64; 2]; 2] {
     let [p, q, r] = [(4, 4), (4, 5), (5, 5)].map(|(a, b)| inner(&edge.rows[a], &edge.rows[b]));
     if p + r == 0.0 {
@@ -326,8 +327,8 @@ const MOST_ITERATIONS: u64 = 30;
 /// Violations below this are rounding.
 const ROUNDING: f64 = 4e-15;
 
-/// Moves the tangents and finds the slopes of the normals. `stiffness` is the weight `w` of the tangents' changes. Without a
-/// start, everything is free and begins with the network's tangents, taken as the natural ones.
+/// Moves the tangents and finds the slopes of the normals. `stiffness` is the weight `w` of the tangents' changes.
+/// Without a start, everything is free and begins with the network's tangents, taken as the natural ones.
 ///
 /// # Errors
 /// When the mesh is too large for the sparse factorization, or the system breaks down.

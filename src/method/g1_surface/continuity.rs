@@ -56,8 +56,8 @@ fn unit(vector: [f64; 3]) -> [f64; 3] {
     times(scaled, 1.0 / length(scaled))
 }
 
-/// Gap, largest angle and sum of the squares of the angles between two patches along their common edge, given as the side of
-/// each; the sides run against each other.
+/// Gap, largest angle and sum of the squares of the angles between two patches along their common edge, given as the
+/// side of each; the sides run against each other.
 fn between(patches: &[Patch], both: [Side; 2], sides: &Sides, scratch: &mut [Evaluated; 2]) -> [f64; 3] {
     let processor = Processor::detect();
     for (side, evaluated) in both.into_iter().zip(scratch.iter_mut()) {

@@ -1,4 +1,5 @@
-//! Patches as nets of 5 by 5 Bezier control points, for other programs: as text, as VTK's Bezier cells, as polyhedral nets.
+//! Patches as nets of 5 by 5 Bezier control points, for other programs: as text, as VTK's Bezier cells, as polyhedral
+//! nets.
 
 use super::frame::Frame;
 use super::patch::Patch;
@@ -6,15 +7,16 @@ use super::surface;
 use crate::mesh::format::{Cells, vtu};
 use std::fmt::Write as _;
 
-/// The control points of all patches, in the coordinates of the file: point `5 i + j` for `B_i(u) B_j(v)` of degree 4. Patch
-/// `k` is face `k` of the mesh; its points 0, 20, 24, 4 are the corners of that face, in the face's order.
+/// The control points of all patches, in the coordinates of the file: point `5 i + j` for `B_i(u) B_j(v)` of degree 4.
+/// Patch `k` is face `k` of the mesh; its points 0, 20, 24, 4 are the corners of that face, in the face's order.
 pub fn of(patches: &[Patch], frame: &Frame) -> Vec<Patch> {
     let mut nets: Vec<Patch> = patches.iter().map(surface::control_points).collect();
     frame.leave(nets.as_flattened_mut());
     nets
 }
 
-/// The control nets of all patches as a VTU file: 25 points a patch, `5 i + j` for `B_i(u) B_j(v)` of degree 4, and 16 quads.
+/// The control nets of all patches as a VTU file: 25 points a patch, `5 i + j` for `B_i(u) B_j(v)` of degree 4, and 16
+/// quads.
 pub fn nets(nets: &[Patch]) -> Vec<u8> {
     let mut cells = Vec::with_capacity(16 * nets.len());
     let mut numbers = Vec::with_capacity(16 * nets.len());
@@ -51,8 +53,8 @@ pub fn bezier(nets: &[Patch], angles: &[f64]) -> Vec<u8> {
 /// The first line of the text.
 const TITLE: &str = "biquartic patches";
 
-/// The control points as text that reads back to the same bits: after the title and the number of patches, 25 lines a patch,
-/// `5 i + j` for `B_i(u) B_j(v)` of degree 4.
+/// The control points as text that reads back to the same bits: after the title and the number of patches, 25 lines a
+/// patch, `5 i + j` for `B_i(u) B_j(v)` of degree 4.
 pub fn text(nets: &[Patch]) -> String {
     let mut out = String::with_capacity(nets.len() * 1500 + 200);
     // Writing to a string cannot fail.

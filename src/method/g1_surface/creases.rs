@@ -1,8 +1,9 @@
 //! Creases of a model: edges at which the surface is continuous but its normal is not.
 //!
-//! The mesh is cut open along them, so that each side has normals of its own and its patches know nothing of the other side;
-//! the curve along a crease is perpendicular to the normals of both sides and shared by both (see [`network`](super::network)).
-//! Where a single crease ends within the surface its end has one normal, and the surface is smooth around that vertex.
+//! The mesh is cut open along them, so that each side has normals of its own and its patches know nothing of the other
+//! side; the curve along a crease is perpendicular to the normals of both sides and shared by both (see
+//! [`network`](super::network)). Where a single crease ends within the surface its end has one normal, and the surface
+//! is smooth around that vertex.
 //!
 //! Edges are creases when the generator says so, the model's list names them, their quads carry different labels in the
 //! file or name different normals at their corners, or their planes meet at more than an angle.
@@ -205,9 +206,9 @@ pub fn cut(
     })
 }
 
-/// Gives the vertices on creases a normal for each side: that of the side's formula where there is one, the mean of those that
-/// the side's corners name in the file, else one estimated from the side's quads.
-/// Returns the number of vertices, before the cut, at which normals were estimated.
+/// Gives the vertices on creases a normal for each side: that of the side's formula where there is one, the mean of
+/// those that the side's corners name in the file, else one estimated from the side's quads. Returns the number of
+/// vertices, before the cut, at which normals were estimated.
 ///
 /// # Errors
 /// When no normal can be estimated.

@@ -1,11 +1,11 @@
-//! Cubic normals along the curves: `N = n1 psi_1 + n2 psi_2 + b1 psi_3 + b2 psi_4`, perpendicular to the curve everywhere,
-//! with slopes `b` that agree on the twist at every corner of every patch.
+//! Cubic normals along the curves: `N = n1 psi_1 + n2 psi_2 + b1 psi_3 + b2 psi_4`, perpendicular to the curve
+//! everywhere, with slopes `b` that agree on the twist at every corner of every patch.
 //!
 //! At a vertex write the slope along a curve that leaves with `t_i` and normal curvature `k_i` as
-//! `b_i = -k_i t_i + s_i n x t_i + v_i n`. Then the corners ask for `s_i + s_{i+1} = (k_i - k_{i+1}) cot a_i`. At a vertex
-//! with an odd number of quads this has one solution; at one with an even number it has a line of them (`s_i` changed by
-//! `+m, -m, +m, ...`) if the [`enclosure`](super::enclosure) condition holds; at a boundary vertex always a line. The two
-//! `v` of an edge follow from `X'.N = 0` at 1/3 and 2/3.
+//! `b_i = -k_i t_i + s_i n x t_i + v_i n`. Then the corners ask for `s_i + s_{i+1} = (k_i - k_{i+1}) cot a_i`. At a
+//! vertex with an odd number of quads this has one solution; at one with an even number it has a line of them (`s_i`
+//! changed by `+m, -m, +m, ...`) if the [`enclosure`](super::enclosure) condition holds; at a boundary vertex always a
+//! line. The two `v` of an edge follow from `X'.N = 0` at 1/3 and 2/3.
 //!
 //! [`exact`] takes the shortest `s` at every vertex on its own, or the member of all these lines for which the sum of
 //! `|b|^2` is least, a sparse positive definite system with one unknown a line.
@@ -28,8 +28,8 @@ pub type Slopes = Vec<[[f64; 3]; 2]>;
 pub struct Residuals {
     /// Largest `|X'.N|` over the curves, relative to the length of `X'`, at 0, 1/8, ..., 1.
     pub perpendicular: f64,
-    /// Largest violation of the twist condition over the corners, `|b_i . t_j - b_j . t_i| / (|t_i| |t_j|)` times the mean
-    /// length of the tangents.
+    /// Largest violation of the twist condition over the corners, `|b_i . t_j - b_j . t_i| / (|t_i| |t_j|)` times the
+    /// mean length of the tangents.
     pub twist: f64,
     /// Longest slope.
     pub largest: f64,

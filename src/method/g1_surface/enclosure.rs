@@ -1,12 +1,14 @@
 //! The enclosure condition at vertices with an even number of quads, and the tangents that meet it.
 //!
-//! Let curves leave a vertex with slopes `t_i` and normal curvatures `k_i`, and let a patch lie between `t_i` and `t_{i+1}`
-//! at the angle `a_i`. A surface of class C2 within every patch and with a common normal along the curves exists only if
-//! `sum_i (-1)^i (k_i - k_{i+1}) cot a_i = 0` when the number of patches is even: the twists of the patches form a cyclic
-//! system with alternating null vector. Natural cubics violate it at ordinary vertices of valence 4.
+//! Let curves leave a vertex with slopes `t_i` and normal curvatures `k_i`, and let a patch lie between `t_i` and
+//! `t_{i+1}` at the angle `a_i`. A surface of class C2 within every patch and with a common normal along the curves
+//! exists only if `sum_i (-1)^i (k_i - k_{i+1}) cot a_i = 0` when the number of patches is even: the twists of the
+//! patches form a cyclic system with alternating null vector. Natural cubics violate it at ordinary vertices of
+//! valence 4.
 //!
-//! [`enclose`] finds tangents in the tangent planes, near the given ones, that meet all these conditions: Newton's method on
-//! all of them at once, each step the shortest one (`J^T (J J^T)^-1 g`), with a sparse Cholesky factorization.
+//! [`enclose`] finds tangents in the tangent planes, near the given ones, that meet all these conditions: Newton's
+//! method on all of them at once, each step the shortest one (`J^T (J J^T)^-1 g`), with a sparse Cholesky
+//! factorization.
 //!
 //! Guaranteed: tangents stay in the tangent planes; the residual never grows. Not guaranteed: that a solution exists near
 //! the start; the residual tells.

@@ -1,8 +1,8 @@
 //! Patches evaluated at many points, eight side by side in vector registers, with derivatives to second order.
 //!
-//! [`Places`] hold the five functions and their derivatives at the points, to be shared among patches; [`evaluate`] runs a
-//! patch over them. The same bits as [`surface::evaluate`](super::surface::evaluate) on every processor: products and sums in
-//! the same order, never fused.
+//! [`Places`] hold the five functions and their derivatives at the points, to be shared among patches; [`evaluate`]
+//! runs a patch over them. The same bits as [`surface::evaluate`](super::surface::evaluate) on every processor:
+//! products and sums in the same order, never fused.
 
 use super::patch::Patch;
 use super::surface::{Jet, Place};

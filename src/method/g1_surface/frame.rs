@@ -1,8 +1,9 @@
 //! Coordinates in which a surface is built: its box about the origin, its diagonal between 1 and 2.
 //!
-//! Patches are evaluated as sums of coefficients; far from the origin these lose as many digits as the distance has more than
-//! the size, and very small or large sizes meet thresholds that were meant for neither. Here the size is a power of two and
-//! the origin a multiple of it, so that entering loses nothing for coordinates that are not themselves rounded.
+//! Patches are evaluated as sums of coefficients; far from the origin these lose as many digits as the distance has
+//! more than the size, and very small or large sizes meet thresholds that were meant for neither. Here the size is a
+//! power of two and the origin a multiple of it, so that entering loses nothing for coordinates that are not
+//! themselves rounded.
 
 use crate::linalg::vector3::{add, subtract, times};
 use crate::mesh::{bounding_box, length};

@@ -1,7 +1,7 @@
 //! The five functions of one variable that curves and patches are made of: the cubic Hermite functions and a bubble.
 //!
-//! `psi_1..psi_4` carry the value at 0, the value at 1, the slope at 0 and the slope at 1; `psi_5 = x^2 (1-x)^2` has neither
-//! value nor slope at the ends. Source: Xue, Demkowicz, Bajaj 2004, equation 4 and Figure 2.
+//! `psi_1..psi_4` carry the value at 0, the value at 1, the slope at 0 and the slope at 1; `psi_5 = x^2 (1-x)^2` has
+//! neither value nor slope at the ends. Source: Xue, Demkowicz, Bajaj 2004, equation 4 and Figure 2.
 
 /// The five functions at `x`.
 #[inline]

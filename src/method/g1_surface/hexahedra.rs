@@ -1,10 +1,10 @@
 //! Curvilinear hexahedra between a surface and a sphere, by transfinite interpolation.
 //!
-//! The sphere carries a copy of the surface's mesh, every vertex moved along its ray from the centre, with G1 patches of its
-//! own; hexahedra span between patches of the same number. Each is the transfinite interpolation of its six faces (Gordon and
-//! Hall 1973); as the faces across are ruled, layers share their faces exactly. The surface must be star-shaped about the
-//! centre for the hexahedra to be valid, and the certificate tells.
-//! Source: Xue, Demkowicz, Bajaj 2004, section 3.
+//! The sphere carries a copy of the surface's mesh, every vertex moved along its ray from the centre, with G1 patches
+//! of its own; hexahedra span between patches of the same number. Each is the transfinite interpolation of its six
+//! faces (Gordon and Hall 1973); as the faces across are ruled, layers share their faces exactly. The surface must be
+//! star-shaped about the centre for the hexahedra to be valid, and the certificate tells. Source: Xue, Demkowicz,
+//! Bajaj 2004, section 3.
 
 use super::edge_normals;
 use super::enclosure;
@@ -243,8 +243,9 @@ fn faces(low: &Patch, high: &Patch) -> [Patch; 6] {
     ]
 }
 
-/// A tessellation as a VTU file: every hexahedron in `pieces` along the surface and one across. `quads` and `connectivity`
-/// are those of the surface before it was cut along creases: hexahedra share points there too, by number.
+/// A tessellation as a VTU file: every hexahedron in `pieces` along the surface and one across. `quads` and
+/// `connectivity` are those of the surface before it was cut along creases: hexahedra share points there too, by
+/// number.
 ///
 /// # Errors
 /// When there would be too many points.

@@ -1,11 +1,12 @@
-//! A test problem that shows what the geometry does to a high-order simulation: `u - (surface Laplacian of u) = f` on patches
-//! that stand for a surface given by a formula, with a known solution.
+//! A test problem that shows what the geometry does to a high-order simulation: `u - (surface Laplacian of u) = f` on
+//! patches that stand for a surface given by a formula, with a known solution.
 //!
-//! The solution is the restriction of `exp(0.7 x - 0.4 y + 0.3 z) + x y - z^2 / 2`. Its Laplacian on the surface with unit
-//! normal `n` and `k = div n` is `tr H - n.H n - k n.grad`, with gradient and Hessian in space. Data on the patches are those
-//! of the nearest point of the true surface, as in the analysis of surface finite elements (Dziuk 1988; Demlow 2009); on open
-//! surfaces the boundary values are given. Functions on the patches are tensor products of Lagrange polynomials at
-//! Gauss-Lobatto points; the geometry is that of the patches at every order, so that nothing but it limits the rates.
+//! The solution is the restriction of `exp(0.7 x - 0.4 y + 0.3 z) + x y - z^2 / 2`. Its Laplacian on the surface with
+//! unit normal `n` and `k = div n` is `tr H - n.H n - k n.grad`, with gradient and Hessian in space. Data on the
+//! patches are those of the nearest point of the true surface, as in the analysis of surface finite elements (Dziuk
+//! 1988; Demlow 2009); on open surfaces the boundary values are given. Functions on the patches are tensor products of
+//! Lagrange polynomials at Gauss-Lobatto points; the geometry is that of the patches at every order, so that nothing
+//! but it limits the rates.
 
 use super::network::in_plane;
 use super::numbering::Numbering;
@@ -56,10 +57,10 @@ fn data(exact: &Analytic, x: [f64; 3]) -> (f64, [f64; 3], f64) {
     (value, tangential, value - laplacian)
 }
 
-/// The gradient in space, at `x`, of the function carried over from the surface by nearest points, from its gradient along the
-/// surface at the nearest point `foot`: the derivative of the nearest point is `(I + d W)^-1 P`, with the signed distance
-/// `d`, the projection `P` onto the tangent plane and the derivative `W` of the unit normal there (Dziuk and Elliott 2013,
-/// Finite element methods for surface PDEs, section 4.1).
+/// The gradient in space, at `x`, of the function carried over from the surface by nearest points, from its gradient
+/// along the surface at the nearest point `foot`: the derivative of the nearest point is `(I + d W)^-1 P`, with the
+/// signed distance `d`, the projection `P` onto the tangent plane and the derivative `W` of the unit normal there
+/// (Dziuk and Elliott 2013, Finite element methods for surface PDEs, section 4.1).
 fn carried(exact: &Analytic, foot: [f64; 3], x: [f64; 3], gradient: [f64; 3]) -> [f64; 3] {
     let level = exact.derivatives(foot);
     let size = dot(level.gradient, level.gradient).sqrt();

@@ -1,9 +1,9 @@
 //! The paper's linear system for the slopes of the normals, in the sense of least squares.
 //!
-//! Unknown are the six components of `b1, b2` of every curve; equations are `t1.b1 = -l1`, `t2.b2 = -l2`, `X'.N = 0` at 1/3
-//! and 2/3 of every curve, and the twist condition at every corner: on a closed surface as many as unknowns, with one rank
-//! less for every vertex of even valence. Source: Xue, Demkowicz, Bajaj 2004, equations 7 to 9, solved there by a singular
-//! value decomposition.
+//! Unknown are the six components of `b1, b2` of every curve; equations are `t1.b1 = -l1`, `t2.b2 = -l2`, `X'.N = 0`
+//! at 1/3 and 2/3 of every curve, and the twist condition at every corner: on a closed surface as many as unknowns,
+//! with one rank less for every vertex of even valence. Source: Xue, Demkowicz, Bajaj 2004, equations 7 to 9, solved
+//! there by a singular value decomposition.
 //!
 //! Small networks are solved in the same way. Larger ones by steps of `(A^T A + m I)^-1 A^T r` with a sparse Cholesky
 //! factorization, which stay in the range of `A^T` and so approach the shortest solution; parts that belong to singular

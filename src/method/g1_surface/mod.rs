@@ -1,17 +1,17 @@
 //! G1 surfaces: biquartic patches with common tangent planes over any mesh of quadrilaterals with normals.
 //!
-//! The stages: [`problem`] reads the model and cuts it open along its [`creases`], [`network`] spans natural cubics over the
-//! edges, [`enclosure`] moves their tangents until surfaces of class C2 can meet at every vertex, [`edge_normals`] finds a cubic
-//! normal along every curve, [`patch`] fits the patches, [`repair`] mends those that fold, [`outcome`] measures them;
-//! [`construction`] runs them. Source: Xue, Demkowicz, Bajaj 2004, Reconstruction of G1 surfaces with biquartic patches for hp
-//! finite element simulations.
+//! The stages: [`problem`] reads the model and cuts it open along its [`creases`], [`network`] spans natural cubics
+//! over the edges, [`enclosure`] moves their tangents until surfaces of class C2 can meet at every vertex,
+//! [`edge_normals`] finds a cubic normal along every curve, [`patch`] fits the patches, [`repair`] mends those that
+//! fold, [`outcome`] measures them; [`construction`] runs them. Source: Xue, Demkowicz, Bajaj 2004, Reconstruction of
+//! G1 surfaces with biquartic patches for hp finite element simulations.
 //!
 //! Guaranteed with the default settings, where a run ends `converged`: no patch folds at 9 by 9 points, and normals of
-//! neighbouring patches agree along their whole edge to rounding, at vertices of every valence, except along creases. A run in
-//! which a patch folds ends `folded` and names it; one whose normals disagree ends `stalled`. Always: patches share their
-//! curves exactly, creases too; the same input gives the same bits with any number of threads; where the surface lies and how
-//! large it is does not matter (see [`frame`]). Not guaranteed: that conditions can be met for all data, that the surface is
-//! free of folds between the points, or does not meet itself.
+//! neighbouring patches agree along their whole edge to rounding, at vertices of every valence, except along creases.
+//! A run in which a patch folds ends `folded` and names it; one whose normals disagree ends `stalled`. Always: patches
+//! share their curves exactly, creases too; the same input gives the same bits with any number of threads; where the
+//! surface lies and how large it is does not matter (see [`frame`]). Not guaranteed: that conditions can be met for
+//! all data, that the surface is free of folds between the points, or does not meet itself.
 
 pub mod balance;
 pub mod construction;

@@ -1,11 +1,12 @@
 //! The network of cubic curves over the edges of a quadrilateral surface.
 //!
-//! A curve interpolates two points and is perpendicular to two normals. Among these, the natural cubic minimizes the integral
-//! of `|X''|^2`; its second derivatives at the ends are parallel to the normals. Source: Xue, Demkowicz, Bajaj 2004, section
+//! A curve interpolates two points and is perpendicular to two normals. Among these, the natural cubic minimizes the
+//! integral of `|X''|^2`; its second derivatives at the ends are parallel to the normals. Source: Xue, Demkowicz,
+//! Bajaj 2004, section
 //! 2.1. They solve a system of eight equations; [`natural`] is its closed form.
 //!
-//! Guaranteed: every curve is perpendicular to the normals at its ends, whatever is done to the tangents by the functions of
-//! this folder. Not guaranteed: that curves do not meet outside their ends.
+//! Guaranteed: every curve is perpendicular to the normals at its ends, whatever is done to the tangents by the
+//! functions of this folder. Not guaranteed: that curves do not meet outside their ends.
 
 use super::creases::Creases;
 use super::hermite;
@@ -79,10 +80,11 @@ pub struct Network {
     pub on_crease: Vec<bool>,
 }
 
-/// The sine between neighbouring curves at a vertex, or the share of a curve's chord within the tangent plane, below which
-/// the tangent plane says nothing about the directions of the curves.
+/// The sine between neighbouring curves at a vertex, or the share of a curve's chord within the tangent plane, below
+/// which the tangent plane says nothing about the directions of the curves.
 const FLAT: f64 = 1e-6;
-/// The sine between the normals of a crease's two sides below which they count as one: their common line would be uncertain.
+/// The sine between the normals of a crease's two sides below which they count as one: their common line would be
+/// uncertain.
 const SAME: f64 = 1e-4;
 /// The cosine between a crease and the line in which its sides' planes meet, below which they do not belong together.
 const CROOKED: f64 = 0.25;
@@ -127,8 +129,8 @@ impl Network {
         Self::creased(mesh, connectivity, normals, None)
     }
 
-    /// The same over a mesh that is cut open along creases: the curve along a crease is the one of least curvature that is
-    /// perpendicular to the normals of both its sides, and the same on both.
+    /// The same over a mesh that is cut open along creases: the curve along a crease is the one of least curvature
+    /// that is perpendicular to the normals of both its sides, and the same on both.
     ///
     /// # Errors
     /// As [`Self::natural`], and where two sides' planes meet in a line across their crease.
@@ -414,8 +416,8 @@ impl Network {
         !self.connectivity.on_boundary[vertex] && self.connectivity.stars.row(vertex).len().is_multiple_of(2)
     }
 
-    /// Integral of `|X''|^2` over all curves, the quantity that natural cubics minimize. `X''` is linear, so Simpson's rule
-    /// is exact.
+    /// Integral of `|X''|^2` over all curves, the quantity that natural cubics minimize. `X''` is linear, so Simpson's
+    /// rule is exact.
     pub fn bending_energy(&self) -> f64 {
         let edge_energy = |edge: usize| {
             let curve = self.curve(edge);

@@ -1,5 +1,5 @@
-//! Numbers of the points that a regular subdivision of all patches has, shared by neighbours: first the vertices, then those
-//! within edges, then those within patches. No coordinates are compared.
+//! Numbers of the points that a regular subdivision of all patches has, shared by neighbours: first the vertices, then
+//! those within edges, then those within patches. No coordinates are compared.
 
 use crate::mesh::quadrilateral::Connectivity;
 

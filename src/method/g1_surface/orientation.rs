@@ -32,7 +32,8 @@ fn connected(connectivity: &Connectivity) -> Vec<u32> {
     part
 }
 
-/// For every vertex whether most normals of its part point to the back of their quads; vertices may be left out of the vote.
+/// For every vertex whether most normals of its part point to the back of their quads; vertices may be left out of the
+/// vote.
 pub fn backward(
     points: &[[f64; 3]],
     quads: &[[u32; 4]],

@@ -194,8 +194,8 @@ fn stripe(phase: f64) -> f64 {
     (0.5 + (std::f64::consts::TAU * phase).cos()).clamp(0.0, 1.0)
 }
 
-/// Isophote stripe and reflection-line stripe for a unit normal, with so many stripes between a normal towards the light and
-/// one away from it.
+/// Isophote stripe and reflection-line stripe for a unit normal, with so many stripes between a normal towards the
+/// light and one away from it.
 ///
 /// Reflection lines are what a far viewer sees of long parallel tubes of light at equal angles on a cylinder around the
 /// surface (Klass 1980, Correction of local surface irregularities using reflection lines).

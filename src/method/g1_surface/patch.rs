@@ -1,17 +1,19 @@
 //! Biquartic patches over the curve network that have the network's normals along their sides.
 //!
 //! A patch is `X = sum C_ab psi_a(u) psi_b(v)`, a and b from 1 to 5. Positions and slopes of the curves give 12 of the
-//! coefficients; the four twists `c` and one coefficient `e` for every side follow from `X_n . N = 0` along the sides; the
-//! middle node from least bending. Corners are numbered (0,0), (1,0), (1,1), (0,1); side `k` runs from corner `k` to `k + 1`.
-//! Source: Xue, Demkowicz, Bajaj 2004, section 2.2.
+//! coefficients; the four twists `c` and one coefficient `e` for every side follow from `X_n . N = 0` along the sides;
+//! the middle node from least bending. Corners are numbered (0,0), (1,0), (1,1), (0,1); side `k` runs from corner `k`
+//! to `k + 1`. Source: Xue, Demkowicz, Bajaj 2004, section 2.2.
 //!
-//! Along a side, `X_n . N` is a polynomial of degree 7 that vanishes at the ends. The paper collocates it at six points: 24
-//! equations with 24 unknowns, of which the slope at every corner appears twice, so that the rank is at most 20. Here the
-//! slopes at the corners fix the normal parts of the twists, and 16 equations are left for 20 unknowns, solved nearest to a
-//! reference by a pivoted QR factorization. [`Solve::Collocation`] is the paper's system with its tolerance.
+//! Along a side, `X_n . N` is a polynomial of degree 7 that vanishes at the ends. The paper collocates it at six
+//! points: 24 equations with 24 unknowns, of which the slope at every corner appears twice, so that the rank is at
+//! most 20. Here the slopes at the corners fix the normal parts of the twists, and 16 equations are left for 20
+//! unknowns, solved nearest to a reference by a pivoted QR factorization. [`Solve::Collocation`] is the paper's system
+//! with its tolerance.
 //!
 //! Guaranteed: patches share the network's curves to the last bit of their coefficients. With slopes that meet the twist
-//! condition the sides have the network's normal to rounding. Not guaranteed: that a patch does not fold between its sides.
+//! condition the sides have the network's normal to rounding. Not guaranteed: that a patch does not fold between its
+//! sides.
 
 use super::continuity::larger;
 use super::edge_normals::{self, Slopes};

@@ -1,9 +1,9 @@
 //! Patches that fold, and tangents found anew around them.
 //!
-//! A patch folds where curves meet their conditions only with long slopes of their normals: then the slopes across its sides
-//! turn over. Around such patches tangents and slopes are [balanced](super::balance) together, everything farther away stays
-//! as it is; each try takes one ring of patches more, and the last one the whole surface, from the natural cubics. A try is
-//! kept when fewer patches fold than before.
+//! A patch folds where curves meet their conditions only with long slopes of their normals: then the slopes across its
+//! sides turn over. Around such patches tangents and slopes are [balanced](super::balance) together, everything
+//! farther away stays as it is; each try takes one ring of patches more, and the last one the whole surface, from the
+//! natural cubics. A try is kept when fewer patches fold than before.
 
 use super::balance;
 use super::construction::MET;
@@ -27,7 +27,8 @@ pub struct Repaired {
     pub notice: Option<String>,
 }
 
-/// Times that tangents are found anew around folds, each within a wider neighbourhood, before the whole surface is balanced.
+/// Times that tangents are found anew around folds, each within a wider neighbourhood, before the whole surface is
+/// balanced.
 const LOCAL: u64 = 4;
 
 /// Repairs the patches that fold. `fit` makes patches from a network and slopes.

@@ -69,8 +69,8 @@ impl Sampled {
         (foot, normal)
     }
 
-    /// The subdivided cube shot along rays from the centre of the surface's box onto the last triangle that each hits, then
-    /// [smoothed](Self::smoothed).
+    /// The subdivided cube shot along rays from the centre of the surface's box onto the last triangle that each hits,
+    /// then [smoothed](Self::smoothed).
     ///
     /// # Errors
     /// Where a ray hits nothing.
@@ -100,8 +100,8 @@ impl Sampled {
         self.smoothed(points, quads, smoothing, observer)
     }
 
-    /// Quads around the surface by dual contouring of its signed distance, `cells` cubes along the longest side of its box,
-    /// moved onto it and [smoothed](Self::smoothed).
+    /// Quads around the surface by dual contouring of its signed distance, `cells` cubes along the longest side of its
+    /// box, moved onto it and [smoothed](Self::smoothed).
     ///
     /// # Errors
     /// Where the surface is open, or too thin for the cubes.
@@ -131,8 +131,8 @@ impl Sampled {
         self.smoothed(points, quads, smoothing, observer)
     }
 
-    /// Every vertex moves halfway to the mean of its neighbours and back onto the surface, `rounds` times, in the end onto
-    /// the surface in any case. Normals are those of the surface.
+    /// Every vertex moves halfway to the mean of its neighbours and back onto the surface, `rounds` times, in the end
+    /// onto the surface in any case. Normals are those of the surface.
     fn smoothed(
         &self,
         mut points: Vec<[f64; 3]>,

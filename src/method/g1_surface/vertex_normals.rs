@@ -4,7 +4,8 @@ use crate::linalg::vector3::{add, cross, dot, subtract, times};
 use crate::mesh::quadrilateral::{Connectivity, QuadrilateralMesh, quad_and_corner};
 
 /// A normal for every vertex: the sum of the unit normals of the quads around it (those of the plane of both diagonals),
-/// weighted by their angles at the vertex. Source: Thürmer and Wüthrich 1998, Computing vertex normals from polygonal facets.
+/// weighted by their angles at the vertex. Source: Thürmer and Wüthrich 1998, Computing vertex normals from polygonal
+/// facets.
 ///
 /// # Errors
 /// Names a vertex where the sum vanishes.

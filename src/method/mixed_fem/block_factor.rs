@@ -17,7 +17,8 @@ pub(super) struct BlockFactor<const B: usize> {
 }
 
 impl<const B: usize> BlockFactor<B> {
-    /// Factorizes a matrix of the factor's structure. `Err`: the vertex of the structure where a pivot has the wrong sign.
+    /// Factorizes a matrix of the factor's structure. `Err`: the vertex of the structure where a pivot has the wrong
+    /// sign.
     pub fn new(name: &'static str, mut factor: BlockCholesky<B>, values: Vec<f64>) -> Result<Self, u32> {
         factor.factorize(&values, 0.0).map_err(|error| error.vertex)?;
         let magnitudes = values.iter().map(|value| value.abs()).collect();

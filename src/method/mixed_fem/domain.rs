@@ -50,7 +50,8 @@ fn invalid(reason: String) -> Failure {
     }
 }
 
-/// The triangles beside each triangle of a mesh, which has to be an oriented manifold: handles and boundary loops rely on it.
+/// The triangles beside each triangle of a mesh, which has to be an oriented manifold: handles and boundary loops rely
+/// on it.
 ///
 /// # Errors
 /// Names the first triangle or vertex where it is none, or two neighbours that are oriented against each other.

@@ -1,9 +1,9 @@
 //! Direct factorizations of the systems, and solutions with iterative refinement.
 //!
-//! The one-field system takes a Cholesky factorization; the mixed one `L D L^T` with pivots of known signs, `L B L^T` with
-//! Bunch-Kaufman pivots within the supernodes of a nested-dissection order, or `LU` where these break down. All run on one
-//! thread or in fixed pieces, so the bits do not depend on the number of threads. A factorization serves any number of
-//! right-hand sides.
+//! The one-field system takes a Cholesky factorization; the mixed one `L D L^T` with pivots of known signs, `L B L^T`
+//! with Bunch-Kaufman pivots within the supernodes of a nested-dissection order, or `LU` where these break down. All
+//! run on one thread or in fixed pieces, so the bits do not depend on the number of threads. A factorization serves
+//! any number of right-hand sides.
 
 use super::block_factor::BlockFactor;
 use super::lblt::{self, Lblt};
@@ -16,7 +16,8 @@ use crate::method::Failure;
 
 /// A backward error that more steps in the same precision do not improve.
 const ROUNDING: f64 = 4.0 * f64::EPSILON;
-/// Refinement ends when the backward error is down to rounding or does not halve, and after this many steps at the latest.
+/// Refinement ends when the backward error is down to rounding or does not halve, and after this many steps at the
+/// latest.
 const REFINEMENTS: usize = 4;
 
 /// A symmetric matrix with a factor that solves for it.
@@ -71,8 +72,8 @@ impl Factorization {
         Ok(Self(Box::new(factor)))
     }
 
-    /// `L D L^T` factorization of a mixed system. `Err`: the place in the numbering's order of a vertex where a pivot has not
-    /// the sign that it should have.
+    /// `L D L^T` factorization of a mixed system. `Err`: the place in the numbering's order of a vertex where a pivot
+    /// has not the sign that it should have.
     pub fn ldlt(system: SignedSystem) -> Result<Self, u32> {
         let factor: Result<Box<dyn Factorized>, u32> = match system {
             SignedSystem::Two(factor, values) => {
@@ -170,9 +171,10 @@ impl Factorization {
         Ok(found)
     }
 
-    /// The residual `b - A x`, `|A| |x| + |b|` row by row, and the smallest relative change of every coefficient of `A` and `b`
-    /// that makes `x` exact: the maximum of `|b - A x| / (|A| |x| + |b|)` over the rows (Oettli and Prager 1964). Rows whose
-    /// denominator is rounding itself are measured against the size of the row and of `x` (Arioli, Demmel and Duff 1989).
+    /// The residual `b - A x`, `|A| |x| + |b|` row by row, and the smallest relative change of every coefficient of
+    /// `A` and `b` that makes `x` exact: the maximum of `|b - A x| / (|A| |x| + |b|)` over the rows (Oettli and Prager
+    /// 1964). Rows whose denominator is rounding itself are measured against the size of the row and of `x` (Arioli,
+    /// Demmel and Duff 1989).
     fn backward_error(&self, x: &[f64], wanted: &[f64], row_sums: &[f64]) -> (Vec<f64>, Vec<f64>, f64) {
         let image = self.0.multiply(x);
         let residual: Vec<f64> = wanted.iter().zip(&image).map(|(b, image)| b - image).collect();
@@ -200,8 +202,8 @@ impl Factorization {
 pub struct Accuracy {
     /// Componentwise relative backward error; not-a-number where the solution is not finite.
     pub backward: f64,
-    /// How much relative changes of all coefficients by the rounding unit, with random signs, change the solution against its
-    /// size: an estimate of what rounding may have done to it.
+    /// How much relative changes of all coefficients by the rounding unit, with random signs, change the solution
+    /// against its size: an estimate of what rounding may have done to it.
     pub forward: f64,
 }
 

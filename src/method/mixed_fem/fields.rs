@@ -60,7 +60,7 @@ pub static FIELDS: &[Field] = &[
         kind: Kind::Choice(&[
             (
                 "linear",
-                "c h s / 20 D with the side s of a square of the domain's area: keeps its rate on finer meshes",
+                "c h s / 80 D with the side s of a square of the domain's area: keeps its rate on finer meshes",
             ),
             (
                 "quadratic",

@@ -48,7 +48,8 @@ impl LowerMatrix {
         result
     }
 
-    /// The number of singular values below 1e-10 of the largest; `None` for more than 600 unknowns, which would take too long.
+    /// The number of singular values below 1e-10 of the largest; `None` for more than 600 unknowns, which would take
+    /// too long.
     pub fn nullity(&self) -> Option<usize> {
         let dimension = self.dimension();
         if dimension > 600 {
@@ -79,8 +80,8 @@ pub struct Numbering {
     pub(super) scale: [f64; 3],
 }
 
-/// The fields in the order in which a vertex's unknowns are numbered: `v`, `w`, `u`. In this order every pivot is nonzero once
-/// those before it are eliminated, even where a vertex is split over supernodes.
+/// The fields in the order in which a vertex's unknowns are numbered: `v`, `w`, `u`. In this order every pivot is
+/// nonzero once those before it are eliminated, even where a vertex is split over supernodes.
 const FIELDS: [usize; 3] = [1, 2, 0];
 
 impl Numbering {
@@ -107,8 +108,8 @@ impl Numbering {
         }
     }
 
-    /// The same number of places, one for each field, at each of the vertices `with`, whether the field is unknown or not; the
-    /// vertices in the given order, the fields in that of [`FIELDS`].
+    /// The same number of places, one for each field, at each of the vertices `with`, whether the field is unknown or
+    /// not; the vertices in the given order, the fields in that of [`FIELDS`].
     pub(super) fn in_blocks(discretization: &Discretization<'_>, with: &[u32]) -> Self {
         let fields = FIELDS.into_iter().filter(|&field| field < discretization.order);
         let mut index = vec![[NONE; 3]; discretization.domain.places.len()];

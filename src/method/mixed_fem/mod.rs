@@ -6,8 +6,8 @@
 //! against a function and [`seam`] how smoothly a surface joins what is kept.
 //! Source: Jacobson, Tosun, Sorkine, Zorin 2010, Mixed finite elements for variational surface modeling.
 //!
-//! Guaranteed: the relative residual of every reported solution is below 1e-9; the same input gives the same bits with any
-//! number of threads. Not guaranteed: convergence of the paper's triharmonic systems on irregular meshes.
+//! Guaranteed: the relative residual of every reported solution is below 1e-9; the same input gives the same bits with
+//! any number of threads. Not guaranteed: convergence of the paper's triharmonic systems on irregular meshes.
 
 mod block_factor;
 pub mod domain;
@@ -50,7 +50,7 @@ impl Method for MixedFem {
     }
 
     fn version(&self) -> u32 {
-        2
+        3
     }
 
     fn summary(&self) -> &'static str {

@@ -8,15 +8,18 @@
 //!   (systems 13 and 15; `w` has the sign of the Laplacian of `v`, opposite to the multiplier of the Lagrangian (7)).
 //!
 //! Known values move to the right. `N b1` integrates the conormal derivative along the boundary, edge by edge with the
-//! edge's own normal, because it jumps at corners. `S`, a multiple of the lumped mass `D` on boundary vertices, relaxes their rows, of which there
-//! are more than unknowns on the first inner ring; without it system (15) is singular (Proposition 2).
-//! Source: Jacobson, Tosun, Sorkine, Zorin 2010, Mixed finite elements for variational surface modeling. The matrix in
-//! front of `u_f` in (11) lacks its second term there, and (14) the inverse mass and its sign; both are set right here.
+//! edge's own normal, because it jumps at corners. `S`, a multiple of the lumped mass `D` on boundary vertices, relaxes
+//! their rows, of which there are more than unknowns on the first inner ring; without it system (15) is singular
+//! (Proposition 2). Source: Jacobson, Tosun, Sorkine, Zorin 2010, Mixed finite elements for variational surface modeling.
+//! The matrix in front of `u_f` in (11) lacks its second term there, and (14) the inverse mass and its sign; both are set
+//! right here.
 //!
-//! The relaxation `S` is ours. What the boundary rows of irregular meshes are short of consistency is divided by it, what it
-//! takes away from them is multiplied: `S = c h^2 D` is more accurate on coarse meshes, but then the errors on irregular
-//! ones level off; `S = c h s / 20 D`, `s^2` the area of the connected part of the domain and `h` its mean edge length, goes on converging as `h^2` on structured and perturbed
-//! meshes as fine as were tried, and on Delaunay meshes with random vertices to some 200 cells a unit length.
+//! The relaxation `S` is ours. What the boundary rows of irregular meshes are short of consistency is divided by it,
+//! what it takes away from them is multiplied. `S = c h^2 D` has errors that level off on irregular meshes. `S = c h s
+//! / 80 D`, `s^2` the area of the connected part of the domain and `h` its mean edge length, goes on converging as
+//! `h^2` on structured and perturbed meshes as fine as were tried; on Delaunay meshes with random vertices the error
+//! falls as `h^2` to some 192 cells a unit length and more slowly, about as `h`, beyond. Larger factors than 1 gain
+//! nothing, smaller ones than 1/4 make it grow as their inverse.
 
 use super::domain::{Domain, Place};
 use crate::fem::surface::SurfaceOperators;
@@ -61,7 +64,7 @@ pub enum Mass {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Relaxation {
-    /// `c h s / 20 D` with the side `s` of a square of the area of a connected part of the domain.
+    /// `c h s / 80 D` with the side `s` of a square of the area of a connected part of the domain.
     Linear,
     /// `c h^2 D`.
     Quadratic,
@@ -75,8 +78,8 @@ pub struct Stabilisation {
     pub factor: f64,
 }
 
-/// Values and derivatives that the conditions prescribe, for several components at once: component `c` of vertex `i` is at
-/// `components i + c`.
+/// Values and derivatives that the conditions prescribe, for several components at once: component `c` of vertex `i`
+/// is at `components i + c`.
 pub struct Data<'a> {
     pub components: usize,
     /// `u` at every vertex that is not free.
@@ -87,7 +90,8 @@ pub struct Data<'a> {
     pub conormal: Vec<f64>,
     /// The Laplacian of `u` at boundary vertices.
     pub laplacian: Vec<f64>,
-    /// First derivatives at a vertex and second ones `[xx, xy, yy]` at a point, where a formula gives them (one component).
+    /// First derivatives at a vertex and second ones `[xx, xy, yy]` at a point, where a formula gives them (one
+    /// component).
     pub taylor: Option<Taylor<'a>>,
 }
 
@@ -418,7 +422,7 @@ impl Stabilisation {
             let [edges, count, area] = sums[part as usize];
             let edge = edges / count;
             let other = match self.relaxation {
-                Relaxation::Linear => area.sqrt() / 20.0,
+                Relaxation::Linear => area.sqrt() / 80.0,
                 Relaxation::Quadratic => edge,
             };
             self.factor * edge * other

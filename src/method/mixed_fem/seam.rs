@@ -1,9 +1,9 @@
 //! Tangents and curvatures at the boundary of a domain on a surface, from each of its two sides, and how they differ.
 //!
-//! At a boundary vertex a quadratic height function over the tangent plane is fitted to the vertices of one side, two rings
-//! deep. It passes through the vertex. The two sides' normals and their normal curvatures across the seam then compare:
-//! their differences measure how far the surface is from C1 and C2 there, up to the error of the fits, which falls with the
-//! edge length.
+//! At a boundary vertex a quadratic height function over the tangent plane is fitted to the vertices of one side, two
+//! rings deep. It passes through the vertex. The two sides' normals and their normal curvatures across the seam then
+//! compare: their differences measure how far the surface is from C1 and C2 there, up to the error of the fits, which
+//! falls with the edge length.
 
 use super::domain::Domain;
 use crate::mesh::{area_vector, cross, dot, length, subtract};

@@ -1,17 +1,18 @@
 //! The mixed system with a block of unknowns for every vertex, whose pivots have signs that are known beforehand.
 //!
-//! Within a vertex the unknowns stand in the order `v`, `w`, `u`, and where a field is known its place holds an equation of
-//! its own that keeps it zero. Take the leading part of the matrix up to any unknown, whatever the order of the vertices. Of
-//! order 2 it is `[-M, L; L^T, 0]`: `M` is positive, and every vertex with `u` has its `v`, so `L` has full column rank,
-//! because a Laplacian on part of a mesh is definite. There are as many negative eigenvalues as `v` and positive ones as
-//! `u`. Of order 3 `L` in the rows of `v` is negative, what is left for `w` is `S + M (-L)^-1 M`, positive, and then `u`
-//! is negative. One more unknown adds one eigenvalue of its sign, so every pivot has that sign, and `L J L^T` with the signs
-//! in `J` exists without pivoting. There are two exceptions, of which the factorization tells. The unstabilised curve
-//! conditions of order 3 leave `w` on the boundary without a diagonal. And on a closed surface with a single fixed point `v` is
-//! unknown everywhere, so that `L` is only semidefinite: if that point comes last, its `v` meets a zero pivot.
+//! Within a vertex the unknowns stand in the order `v`, `w`, `u`, and where a field is known its place holds an
+//! equation of its own that keeps it zero. Take the leading part of the matrix up to any unknown, whatever the order
+//! of the vertices. Of order 2 it is `[-M, L; L^T, 0]`: `M` is positive, and every vertex with `u` has its `v`, so `L`
+//! has full column rank, because a Laplacian on part of a mesh is definite. There are as many negative eigenvalues as
+//! `v` and positive ones as `u`. Of order 3 `L` in the rows of `v` is negative, what is left for `w` is `S + M (-L)^-1
+//! M`, positive, and then `u` is negative. One more unknown adds one eigenvalue of its sign, so every pivot has that
+//! sign, and `L J L^T` with the signs in `J` exists without pivoting. There are two exceptions, of which the
+//! factorization tells. The unstabilised curve conditions of order 3 leave `w` on the boundary without a diagonal. And
+//! on a closed surface with a single fixed point `v` is unknown everywhere, so that `L` is only semidefinite: if that
+//! point comes last, its `v` meets a zero pivot.
 //!
-//! Guaranteed: existence in exact arithmetic under these conditions. Not guaranteed: an error as small as with pivoting; the
-//! residual tells, and refinement halves it as long as it can.
+//! Guaranteed: existence in exact arithmetic under these conditions. Not guaranteed: an error as small as with
+//! pivoting; the residual tells, and refinement halves it as long as it can.
 
 use super::mixed_system::{NONE, Numbering, coefficients, vertex_graph};
 use super::scheme::Discretization;

@@ -4,8 +4,8 @@
 //! surface as it is takes its place. With the unit conormal `c` away from the domain, the unit normal `N`, the normal
 //! curvature `k` along `c`, and the arc length `s` along the curve,
 //! `du/dn = speed scale (cos(angle) c + sin(angle) N)` and
-//! `Laplacian u = d2u/ds2 + k_g du/dn + speed^2 (scale k + offset) N`, where `k_g` is the curvature of the boundary within
-//! the domain. The speed is 1 unless the surface is mapped from a domain of another shape.
+//! `Laplacian u = d2u/ds2 + k_g du/dn + speed^2 (scale k + offset) N`, where `k_g` is the curvature of the boundary
+//! within the domain. The speed is 1 unless the surface is mapped from a domain of another shape.
 
 use super::domain::{Domain, Place};
 use super::seam::Sides;
@@ -40,7 +40,8 @@ fn unit(vector: [f64; 3]) -> [f64; 3] {
 }
 
 /// Prescribes tangents and curvatures for a surface with the given places. `mapped` says that the places are not those of
-/// the mesh. With `change` only the change against angle 0, scales 1 and offset 0 is prescribed, as displacements need it.
+/// the mesh. With `change` only the change against angle 0, scales 1 and offset 0 is prescribed, as displacements need
+/// it.
 pub fn prescribe(
     domain: &Domain<'_>,
     sides: &Sides<'_>,

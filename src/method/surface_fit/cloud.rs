@@ -1,8 +1,8 @@
 //! Targets that are clouds of points: reading them, and the distance from every point to the fit.
 //!
-//! A cloud has no surface to integrate over. Its term is the sum over the points of their squared distances to the fit, each
-//! point with the same weight; the foot on the nearest triangle is differentiated with the triangle, which is exact where
-//! the nearest triangle is the only one.
+//! A cloud has no surface to integrate over. Its term is the sum over the points of their squared distances to the
+//! fit, each point with the same weight; the foot on the nearest triangle is differentiated with the triangle, which
+//! is exact where the nearest triangle is the only one.
 
 use crate::geometry::closest_point::{ClosestPoint, Nearest};
 use crate::mesh::{TriangleMesh, area_vector, cross, dot, length, subtract};
@@ -10,8 +10,8 @@ use crate::mesh::{TriangleMesh, area_vector, cross, dot, length, subtract};
 /// Most bytes of a file that are read as points.
 const LARGEST: usize = 2 << 30;
 
-/// The points of a text with three or more numbers a line, the first three being coordinates. `None` where the name does not
-/// say that it is one (`.xyz`, `.pts`).
+/// The points of a text with three or more numbers a line, the first three being coordinates. `None` where the name
+/// does not say that it is one (`.xyz`, `.pts`).
 ///
 /// # Errors
 /// A line that is not a point, with its number, and a file beyond the size limit.

@@ -3,8 +3,8 @@
 //! With the cells held still both terms are quadratic in the fitted points: a piece of area `a` pulls a point with
 //! `a (I + (s^2 - 1) n n^T)`. These blocks `B`, one a fitted point, and the regularizers give
 //! `2 M^T (B + lambda L^2 + mu L P L) M` over the control points, with the projections `P` along the fit. Normal and
-//! tangential stiffness differ by `s^2`, 2500 by default, which no step of plain L-BFGS copes with. The blocks follow the fit:
-//! they are made anew every few evaluations.
+//! tangential stiffness differ by `s^2`, 2500 by default, which no step of plain L-BFGS copes with. The blocks follow
+//! the fit: they are made anew every few evaluations.
 
 use super::objective::Tangent;
 use crate::linalg::sparse::{BlockCholesky, BlockPattern};
@@ -137,8 +137,8 @@ impl Preconditioner {
         })
     }
 
-    /// Factorizes the model with a block for every fitted point, and the factors `lambda` and `mu` of the regularizer and of
-    /// its part along the fit.
+    /// Factorizes the model with a block for every fitted point, and the factors `lambda` and `mu` of the regularizer
+    /// and of its part along the fit.
     ///
     /// # Errors
     /// When it cannot be factorized.

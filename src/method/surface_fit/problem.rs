@@ -196,7 +196,8 @@ impl Problem {
         })
     }
 
-    /// Leaves the fit the centres of the target's triangles and nothing else; distances are still measured to the surface.
+    /// Leaves the fit the centres of the target's triangles and nothing else; distances are still measured to the
+    /// surface.
     fn use_points_alone(&mut self) {
         let centres = self.target.cells.iter().map(|&cell| {
             let [a, b, c] = self.target.corners(cell);

@@ -1,5 +1,5 @@
-//! A template that follows its target: the boundary of the cubes of a grid whose centres lie within the target. It has the
-//! handles that the grid resolves, which no box has.
+//! A template that follows its target: the boundary of the cubes of a grid whose centres lie within the target. It has
+//! the handles that the grid resolves, which no box has.
 
 use crate::mesh::TriangleMesh;
 use crate::mesh::surface::Surface;

@@ -1,11 +1,11 @@
 //! Where to raise the order: where the boundary is farthest from the target, or where the energy promises to fall.
 //!
-//! By distance, the default: an element counts as far as the farthest of its boundary's samples is from the target, or the
-//! farthest of the target's vertices whose nearest point lies on it. Those beyond a share of the largest are raised. By
-//! energy: all orders are raised by one without moving anything; then `eta_e = 1/2 sum |g_i|^2 / d_i` over the new
-//! functions of an element, with the gradient g of the whole energy and the diagonal d of the model Hessian, predicts how
-//! much the energy would fall. A function shared by several elements counts in equal parts. The energy is a mean over the
-//! surface, so that this indicator leaves small places with a large distance alone.
+//! By distance, the default: an element counts as far as the farthest of its boundary's samples is from the target, or
+//! the farthest of the target's vertices whose nearest point lies on it. Those beyond a share of the largest are
+//! raised. By energy: all orders are raised by one without moving anything; then `eta_e = 1/2 sum |g_i|^2 / d_i` over
+//! the new functions of an element, with the gradient g of the whole energy and the diagonal d of the model Hessian,
+//! predicts how much the energy would fall. A function shared by several elements counts in equal parts. The energy is
+//! a mean over the surface, so that this indicator leaves small places with a large distance alone.
 
 use super::fit::Fit;
 use super::settings::{Adaptive, Indicator};

@@ -1,10 +1,10 @@
-//! Polynomial volumes fitted to surfaces: hexahedra, prisms and tetrahedra of high order whose boundary flows onto a target
-//! while a barrier keeps them valid.
+//! Polynomial volumes fitted to surfaces: hexahedra, prisms and tetrahedra of high order whose boundary flows onto a
+//! target while a barrier keeps them valid.
 //!
-//! [`template`] and [`target`] read the model, [`objective`] puts the surface energy and the volume energy together, L-BFGS
-//! minimizes stage by stage while the order rises, [`outcome`] measures. Two relatives share the machinery: volumes whose
-//! unknowns are the control points of a subdivision, and [`shell`]s that take a prescribed thickness. Source: Jin et al.
-//! 2013, Mapping polynomial volumes; the surface terms: Nivoliers, Yan and Lévy 2012.
+//! [`template`] and [`target`] read the model, [`objective`] puts the surface energy and the volume energy together,
+//! L-BFGS minimizes stage by stage while the order rises, [`outcome`] measures. Two relatives share the machinery:
+//! volumes whose unknowns are the control points of a subdivision, and [`shell`]s that take a prescribed thickness.
+//! Source: Jin et al. 2013, Mapping polynomial volumes; the surface terms: Nivoliers, Yan and Lévy 2012.
 //!
 //! Guaranteed: every accepted iterate has positive determinants at all quadrature points; within a stage the energy never
 //! rises; the same input gives the same bits with any number of threads. Not guaranteed: that elements are valid between

@@ -1,12 +1,12 @@
-//! A positive definite model of the Hessian, constant from one refreshment to the next: stiffness of the cells as they are,
-//! and the mass of the boundary along its normals.
+//! A positive definite model of the Hessian, constant from one refreshment to the next: stiffness of the cells as they
+//! are, and the mass of the boundary along its normals.
 //!
 //! The volume energy is one of logarithmic strains, or grows like one, so that it bends like
-//! `lambda / |Omega| int |grad_x u|^2 dX`: gradients by the place in space, volume of the reference. A cell that is crushed
-//! to a share c of its thickness is 1 / c^2 times as stiff. With the mean over the cell of the metric
-//! `G = J^-1 J^-T` in canonical coordinates that is `sum_ij G_ij int dN_a/du_i dN_b/du_j`. The surface energy bends like
-//! `4 / (A L^2) int (n . u)^2`, and a share `1 / s^2` of it along the surface. Functions up to some order are factorized together, those above are divided
-//! by their diagonal: hierarchical bases are nearly orthogonal between orders.
+//! `lambda / |Omega| int |grad_x u|^2 dX`: gradients by the place in space, volume of the reference. A cell that is
+//! crushed to a share c of its thickness is 1 / c^2 times as stiff. With the mean over the cell of the metric `G =
+//! J^-1 J^-T` in canonical coordinates that is `sum_ij G_ij int dN_a/du_i dN_b/du_j`. The surface energy bends like `4
+//! / (A L^2) int (n . u)^2`, and a share `1 / s^2` of it along the surface. Functions up to some order are factorized
+//! together, those above are divided by their diagonal: hierarchical bases are nearly orthogonal between orders.
 
 use crate::fem::batches::{Batches, in_frame};
 use crate::fem::boundary::Boundary;

@@ -1,7 +1,7 @@
 //! How good the elements are: scaled Jacobians and determinants.
 //!
-//! Means are taken over a thousand points spread evenly over the canonical cell, extremes over these and a lattice with the
-//! corners, edges and faces, where elements fail first.
+//! Means are taken over a thousand points spread evenly over the canonical cell, extremes over these and a lattice
+//! with the corners, edges and faces, where elements fail first.
 
 use super::invalid;
 use crate::fem::batches::{Batches, unit_reference};

@@ -1,4 +1,5 @@
-//! Shell meshes: layers of prisms on one or both sides of a surface at a prescribed distance (Jin et al. 2013, section 4.4).
+//! Shell meshes: layers of prisms on one or both sides of a surface at a prescribed distance (Jin et al. 2013, section
+//! 4.4).
 //!
 //! A thin shell is grown along the vertices' normals; then every prism strives, by the volume energy, for the thickness
 //! `distance / layers` over the very shape of the triangle it stands on, while the surface itself stays where it is.

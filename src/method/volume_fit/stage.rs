@@ -17,8 +17,8 @@ use std::rc::Rc;
 /// Share of the least determinant that a step must leave.
 const LEAST_SHARE: f64 = 0.2;
 
-/// A preconditioner is made anew after so many steps in a row that are shorter than this: the barrier then bends the energy
-/// otherwise than the model does.
+/// A preconditioner is made anew after so many steps in a row that are shorter than this: the barrier then bends the
+/// energy otherwise than the model does.
 const SHORT_STEPS: u32 = 6;
 const SHORT: f64 = 0.1;
 
@@ -225,8 +225,8 @@ impl Fit<'_> {
             done += solution.counters.iterations;
             self.count("iterations", solution.counters.iterations);
             self.count("evaluations", solution.counters.evaluations);
-            // A step cut short by the barrier changes little as well: only when a fresh start finds nothing either has the
-            // stage converged.
+            // A step cut short by the barrier changes little as well: only when a fresh start finds nothing either has
+            // the stage converged.
             let by_change =
                 solution.stop == StopReason::Converged && solution.gradient_norm >= settings.gradient_tolerance;
             let again = by_change

@@ -1,8 +1,8 @@
-//! Subdivision volumes: the control points of multi-linear averaging are the unknowns, the mesh of the next level carries the
-//! energy (Jin et al. 2013, section 4.3).
+//! Subdivision volumes: the control points of multi-linear averaging are the unknowns, the mesh of the next level
+//! carries the energy (Jin et al. 2013, section 4.3).
 //!
-//! Level by level: the control mesh is subdivided once, its points are optimized through that map, and the subdivided mesh
-//! becomes the control mesh of the next level. Creases and corners of the template stay creases and corners.
+//! Level by level: the control mesh is subdivided once, its points are optimized through that map, and the subdivided
+//! mesh becomes the control mesh of the next level. Creases and corners of the template stay creases and corners.
 
 use super::chart::Chart;
 use super::fit::{Fit, interrupted};

@@ -1,8 +1,8 @@
 //! The surface energy: how far the template's boundary and the target are from each other, both ways.
 //!
-//! `E_S = (F_(S -> T) + F_(T -> S)) / (A L^2)` with `L = V / A` from the target's area and volume (Jin et al. 2013, equation
-//! 9; Nivoliers et al. 2012). Distances along normals count in full, those along the surface divided by the anisotropy s:
-//! the weights are `A_s / s`, so that the energy approximates the normal distance whatever s is.
+//! `E_S = (F_(S -> T) + F_(T -> S)) / (A L^2)` with `L = V / A` from the target's area and volume (Jin et al. 2013,
+//! equation 9; Nivoliers et al. 2012). Distances along normals count in full, those along the surface divided by the
+//! anisotropy s: the weights are `A_s / s`, so that the energy approximates the normal distance whatever s is.
 
 use super::settings::Terms;
 use super::target::Target;

@@ -13,8 +13,8 @@
 //! Planar faces are found on any target: triangles are gathered across edges while their vertices stay on one plane. On
 //! a curved target only the third check applies. Orientation is decided by exact predicates, but whether vertices lie on
 //! one plane by a tolerance: an obstacle of the first two kinds is certain only as far as the target's faces are flat to
-//! rounding. Not guaranteed: that a boundary which passes has a map without inversions; no complete test is known in three
-//! dimensions.
+//! rounding. Not guaranteed: that a boundary which passes has a map without inversions; no complete test is known in
+//! three dimensions.
 
 use crate::mesh::connectivity::{self, Boundary, NONE};
 use crate::mesh::split::{self, Refinement};

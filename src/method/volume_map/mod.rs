@@ -2,8 +2,8 @@
 //!
 //! The stages: [`problem`] reads the model and splits what would force inversions, [`feasibility`] names what else the
 //! boundary forbids, [`start`] places the vertices, [`untangle`] turns inverted tetrahedra, one of four solvers minimizes
-//! the distortion, [`outcome`] measures the map. Source of the energies and of the relaxation-enhanced solver: Jin, Huang,
-//! Tong 2015, Stretch-minimizing volumetric parameterization.
+//! the distortion, [`outcome`] measures the map. Source of the energies and of the relaxation-enhanced solver: Jin,
+//! Huang, Tong 2015, Stretch-minimizing volumetric parameterization.
 //!
 //! Guaranteed: a map that is reported as converged under a barrier has no inverted tetrahedron; the same input gives the
 //! same bits with any number of threads. Not guaranteed: that a map without inversions exists or is found; then the

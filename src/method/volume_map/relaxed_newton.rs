@@ -7,8 +7,9 @@
 //! time the method has converged off the target.
 //!
 //! Converged when the norm of the gradient, its slopes at the boundary divided by the weight where that exceeds 1, or the
-//! change of the energy in a step of at least half the Newton direction is small. Guaranteed: no tetrahedron is inverted if none was and the energy or the barrier forbids it. Not guaranteed:
-//! that the boundary reaches its target; the residual is reported.
+//! change of the energy in a step of at least half the Newton direction is small. Guaranteed: no tetrahedron is
+//! inverted if none was and the energy or the barrier forbids it. Not guaranteed: that the boundary reaches its
+//! target; the residual is reported.
 
 use super::objective::{MapObjective, Pull};
 use super::problem::Problem;

@@ -3,8 +3,9 @@
 //! Minimizes the mean of `A / chi^(2/3) + lambda (D^2 + 1) / chi` with `A = |J|^2`, `D = det J` and the regularized
 //! determinant `chi(D) = (D + sqrt(epsilon^2 + D^2)) / 2`, for a falling sequence of `epsilon`. After a minimization from
 //! `F0` to `F1` the next `epsilon` solves `chi(D_min, epsilon) = (1 - sigma) chi(D_min, previous)` with
-//! `sigma = max(1 - F1 / F0, decrease)`: fast while the energy falls fast, never in one leap. It starts at the larger of 1
-//! and the depth of the deepest inversion. Each minimization is projected Newton, its steps limited by decrease alone.
+//! `sigma = max(1 - F1 / F0, decrease)`: fast while the energy falls fast, never in one leap. It starts at the larger
+//! of 1 and the depth of the deepest inversion. Each minimization is projected Newton, its steps limited by decrease
+//! alone.
 //!
 //! The Jacobian is taken from a rest shape of the target's volume. By default that shape is scaled from place to place:
 //! the logarithm of the square root of target area over source area, at the boundary vertices, is extended harmonically

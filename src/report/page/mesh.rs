@@ -1,7 +1,9 @@
-//! Result meshes in few bytes: connectivity once per distinct mesh, positions in 13 bits, fields in 5 to 7, deflated, base64.
+//! Result meshes in few bytes: connectivity once per distinct mesh, positions in 13 bits, fields in 5 to 7, deflated,
+//! base64.
 //!
 //! Cells are sorted along a space-filling curve and points numbered as the cells first use them, so that differences of
-//! neighbours are small. Byte planes are stored one after the other, which deflate likes. Exact figures are in the VTU file.
+//! neighbours are small. Byte planes are stored one after the other, which deflate likes. Exact figures are in the VTU
+//! file.
 
 use crate::report::picture::colour::Scale;
 use crate::report::picture::solid::Solid;
@@ -165,7 +167,8 @@ pub fn topology(solid: &Solid, order: &Order) -> Packed {
     }
 }
 
-/// Image positions (where there is a source), fields as differences from the cell before, and the marks of inverted cells.
+/// Image positions (where there is a source), fields as differences from the cell before, and the marks of inverted
+/// cells.
 pub fn image(solid: &Solid, order: &Order, ranges: &[Scale], levels: u8) -> Packed {
     let mut bytes = Vec::new();
     let mut boxes = Vec::new();
@@ -193,7 +196,8 @@ pub fn image(solid: &Solid, order: &Order, ranges: &[Scale], levels: u8) -> Pack
     }
 }
 
-/// Appends each coordinate as the difference from the point before, in two bytes, low bytes of an axis and then high ones.
+/// Appends each coordinate as the difference from the point before, in two bytes, low bytes of an axis and then high
+/// ones.
 fn positions(points: &[[f64; 3]], order: &Order, bytes: &mut Vec<u8>) -> [[f64; 3]; 2] {
     let used: Vec<[f64; 3]> = order.points.iter().map(|&point| points[point as usize]).collect();
     let bounds = bounds(&used);

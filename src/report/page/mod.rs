@@ -1,7 +1,7 @@
 //! `index.html`: one page that holds everything and loads nothing.
 //!
-//! It reads without scripts: tables are tables, plots are SVG, every mesh has a rendered poster. With scripts a poster opens
-//! into a viewer. All text from files and records is escaped. It has no clock and no random part.
+//! It reads without scripts: tables are tables, plots are SVG, every mesh has a rendered poster. With scripts a poster
+//! opens into a viewer. All text from files and records is escaped. It has no clock and no random part.
 
 pub mod html;
 pub mod mesh;

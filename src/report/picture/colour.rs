@@ -28,7 +28,8 @@ pub struct Scale {
 }
 
 impl Scale {
-    /// A scale from the 1st to the 99th percentile; logarithmic where all values are positive and these span a factor of 3.
+    /// A scale from the 1st to the 99th percentile; logarithmic where all values are positive and these span a factor
+    /// of 3.
     pub fn of(values: impl Iterator<Item = f64>) -> Scale {
         let mut sorted: Vec<f64> = values.filter(|value| value.is_finite()).collect();
         sorted.sort_by(f64::total_cmp);

@@ -1,5 +1,5 @@
-//! Pictures of result meshes: the poster of each job, drawn in software so that it needs no graphics card and comes out the
-//! same everywhere.
+//! Pictures of result meshes: the poster of each job, drawn in software so that it needs no graphics card and comes
+//! out the same everywhere.
 
 pub mod colour;
 pub mod cut;

@@ -1,6 +1,7 @@
 //! Drawing of a chart on any backend of plotters.
 //!
-//! Coordinates are whole numbers on a canvas 3200 wide: an SVG scales them through its viewBox, a bitmap is averaged down.
+//! Coordinates are whole numbers on a canvas 3200 wide: an SVG scales them through its viewBox, a bitmap is averaged
+//! down.
 
 use super::axis::Kind;
 use super::{Chart, Look, Point};
@@ -27,7 +28,8 @@ pub enum Role {
     Series(usize),
 }
 
-/// Colours told apart by people with any kind of colour vision (Okabe and Ito 2008), with yellow darkened for white paper.
+/// Colours told apart by people with any kind of colour vision (Okabe and Ito 2008), with yellow darkened for white
+/// paper.
 pub const SERIES: [(u8, u8, u8); 8] = [
     (0, 114, 178),
     (213, 94, 0),

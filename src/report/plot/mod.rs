@@ -1,8 +1,8 @@
 //! Plots: traces over iterations, figures over numeric axes, figures over named values.
 //!
 //! A chart is data first ([`chart`]), then drawn through plotters onto whole-numbered coordinates fine enough for print
-//! ([`draw`]), as SVG whose colours follow the reader's light or dark setting ([`svg`]) and as PNG ([`bitmap`]). Series are
-//! told apart by dashes, markers and their names at the line's end; colour comes on top.
+//! ([`draw`]), as SVG whose colours follow the reader's light or dark setting ([`svg`]) and as PNG ([`bitmap`]).
+//! Series are told apart by dashes, markers and their names at the line's end; colour comes on top.
 
 pub mod axis;
 pub mod bitmap;
@@ -165,8 +165,9 @@ impl Chart {
     }
 }
 
-/// Gives each series its look. Few have a colour and a shape of their own; of more than there are colours, those of one value
-/// of the first axis share the colour and those of equal values of the others the shape, where there are enough of both.
+/// Gives each series its look. Few have a colour and a shape of their own; of more than there are colours, those of
+/// one value of the first axis share the colour and those of equal values of the others the shape, where there are
+/// enough of both.
 fn look(series: &mut [Series], axes: usize) {
     for (index, one) in series.iter_mut().enumerate() {
         one.look = Look {

@@ -1,8 +1,8 @@
 //! Tables as the experiment file asks for them: rows of axis values, columns of figures, printed figures beside ours.
 //!
-//! Every job of the table's condition is in it. A job without a figure has the word for its end in the cell and its reason in
-//! a note. Several jobs in one cell (axes that are neither in `rows` nor `across`) give their mean and sample standard
-//! deviation.
+//! Every job of the table's condition is in it. A job without a figure has the word for its end in the cell and its
+//! reason in a note. Several jobs in one cell (axes that are neither in `rows` nor `across`) give their mean and
+//! sample standard deviation.
 
 pub mod csv;
 pub mod html;
@@ -268,7 +268,8 @@ impl<'a> Across<'a> {
     }
 }
 
-/// Every combination of values across that occurs, in the order of the jobs; one of none where the table has no such axes.
+/// Every combination of values across that occurs, in the order of the jobs; one of none where the table has no such
+/// axes.
 fn across<'a>(table: &Table, rows: &'a [Row]) -> Vec<Across<'a>> {
     let mut found: Vec<Across> = Vec::new();
     for row in rows.iter().filter(|row| row.matches(&table.condition)) {

@@ -1,4 +1,5 @@
-//! Writing Bezier cells: tensor products of Bernstein polynomials over control points, which VTK since 9.0 evaluates exactly.
+//! Writing Bezier cells: tensor products of Bernstein polynomials over control points, which VTK since 9.0 evaluates
+//! exactly.
 
 use super::write::{Body, FieldView, document};
 
@@ -6,8 +7,8 @@ use super::write::{Body, FieldView, document};
 const QUADRILATERAL: u8 = 77;
 const HEXAHEDRON: u8 = 79;
 
-/// The control points `(i, j)` of a quadrilateral in VTK's order: corners, then the sides (each in the direction in which `i`
-/// or `j` grows), then the inside row by row.
+/// The control points `(i, j)` of a quadrilateral in VTK's order: corners, then the sides (each in the direction in
+/// which `i` or `j` grows), then the inside row by row.
 pub fn quadrilateral_order(order: usize) -> Vec<[usize; 2]> {
     let n = order;
     let mut places = vec![[0, 0], [n, 0], [n, n], [0, n]];

@@ -17,8 +17,8 @@ fn code(shape: Shape) -> u8 {
     }
 }
 
-/// A cell's lattice points in VTK's order (that of files of version 2.2: the fourth upright edge of a hexahedron after the
-/// third in the cycle).
+/// A cell's lattice points in VTK's order (that of files of version 2.2: the fourth upright edge of a hexahedron after
+/// the third in the cycle).
 pub fn order_of_points(shape: Shape, order: usize) -> Vec<[usize; 3]> {
     let edges: &[[usize; 2]] = match shape {
         Shape::Tetrahedron => &[[0, 1], [1, 2], [2, 0], [0, 3], [1, 3], [2, 3]],

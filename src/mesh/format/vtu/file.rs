@@ -473,7 +473,8 @@ impl<'a> File<'a> {
         Ok(values)
     }
 
-    /// Keeps arrays that share their place from multiplying the file: the sum of all may be twice its size (base64, decoded).
+    /// Keeps arrays that share their place from multiplying the file: the sum of all may be twice its size (base64,
+    /// decoded).
     fn account(&self, bytes: usize) -> Result<(), String> {
         self.decoded.set(self.decoded.get().saturating_add(bytes));
         if self.decoded.get() > 2 * self.bytes.len() {

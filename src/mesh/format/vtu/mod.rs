@@ -1,9 +1,9 @@
 //! VTU: VTK's unstructured grid in XML, the format of results.
 //!
-//! Read: ASCII, inline base64 and appended (raw or base64) arrays, uncompressed or compressed by zlib, both byte orders, both
-//! header types; one piece. Written: inline base64, little-endian, blocks of 32 KiB compressed by zlib, 64-bit headers, so
-//! that the file is valid XML, every number keeps its bits, and the same content gives the same bytes.
-//! Source: the VTK user's guide, 11th edition, section 19.3, "XML file formats".
+//! Read: ASCII, inline base64 and appended (raw or base64) arrays, uncompressed or compressed by zlib, both byte
+//! orders, both header types; one piece. Written: inline base64, little-endian, blocks of 32 KiB compressed by zlib,
+//! 64-bit headers, so that the file is valid XML, every number keeps its bits, and the same content gives the same
+//! bytes. Source: the VTK user's guide, 11th edition, section 19.3, "XML file formats".
 
 mod bezier;
 pub mod curved;

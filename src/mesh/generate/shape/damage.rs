@@ -1,5 +1,5 @@
-//! What scanners and careless exporters do to a surface: holes, flipped and degenerate triangles, soups, overlapping scans,
-//! fins, noise.
+//! What scanners and careless exporters do to a surface: holes, flipped and degenerate triangles, soups, overlapping
+//! scans, fins, noise.
 
 use super::super::{Arguments, Parameter, SplitMix};
 use crate::mesh::{TriangleMesh, area_vector, diagonal, length, subtract};

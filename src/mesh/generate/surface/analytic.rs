@@ -6,7 +6,8 @@ use crate::linalg::vector3::{dot, subtract};
 use crate::mesh::length;
 use nalgebra::{Matrix4, Vector4};
 
-/// A bump on a star-shaped surface: the radius in the unit direction `q` grows by `height exp(sharpness (q . direction - 1))`.
+/// A bump on a star-shaped surface: the radius in the unit direction `q` grows by `height exp(sharpness (q . direction
+/// - 1))`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bump {
     /// Of length 1.
@@ -134,7 +135,8 @@ impl Analytic {
     /// `level = 0`. Far away (beyond the nearest centre of curvature) it may be another stationary point.
     pub fn closest(&self, x: [f64; 3]) -> [f64; 3] {
         let mut y = x;
-        // Along the gradient onto the surface, roughly: Newton's method then starts with a foot and a multiplier that fit.
+        // Along the gradient onto the surface, roughly: Newton's method then starts with a foot and a multiplier that
+        // fit.
         let mut first = self.derivatives(y);
         for _ in 0..4 {
             let square = dot(first.gradient, first.gradient);

@@ -1,4 +1,5 @@
-//! Spheres, ellipsoids and a head-like shape over the subdivided cube: eight vertices of valence 3, the others of valence 4.
+//! Spheres, ellipsoids and a head-like shape over the subdivided cube: eight vertices of valence 3, the others of
+//! valence 4.
 
 use super::analytic::{Analytic, Bump};
 use super::{

@@ -1,5 +1,5 @@
-//! Generators of quadrilateral surfaces whose vertices and normals lie on a surface given by a formula, or on several that
-//! meet in creases.
+//! Generators of quadrilateral surfaces whose vertices and normals lie on a surface given by a formula, or on several
+//! that meet in creases.
 
 pub mod analytic;
 pub mod creased;

@@ -211,6 +211,13 @@ fn files_are_found_beside_the_experiment_then_in_the_folders() {
     assert!(errors[0].message.starts_with("cannot read "), "{}", errors[0].message);
 }
 
+/// The lines of a template's settings.
+fn held_lines(text: &str) -> impl Iterator<Item = &str> {
+    text.lines()
+        .skip_while(|line| *line != "[settings]")
+        .take_while(|line| *line != "[vary]")
+}
+
 #[test]
 fn the_template_of_every_method_plans() {
     let all: Vec<&'static dyn Method> = methods().iter().chain(METHODS).copied().collect();
@@ -227,15 +234,11 @@ fn the_template_of_every_method_plans() {
             Plan::new(experiment, &Lookup::default()).unwrap_or_else(|errors| panic!("{}", render(&errors, false)));
         assert!(plan.jobs.len() > 1);
         // Every default that stands in a comment may be written out: all settings uncommented plan too.
-        let held: String = text
-            .lines()
-            .skip_while(|line| *line != "[settings]")
-            .take_while(|line| *line != "[vary]")
-            .fold(String::new(), |text, line| {
-                let body = line.strip_prefix("# ").unwrap_or(line);
-                let code = body.starts_with('[') || body.split_once(" = ").is_some_and(|(key, _)| !key.contains(' '));
-                if code { text + body + "\n" } else { text }
-            });
+        let held: String = held_lines(&text).fold(String::new(), |text, line| {
+            let body = line.strip_prefix("# ").unwrap_or(line);
+            let code = body.starts_with('[') || body.split_once(" = ").is_some_and(|(key, _)| !key.contains(' '));
+            if code { text + body + "\n" } else { text }
+        });
         let rest: String = text
             .lines()
             .take_while(|line| *line != "[settings]")
@@ -243,6 +246,32 @@ fn the_template_of_every_method_plans() {
         let full = format!("{rest}{held}");
         Experiment::parse(Path::new("full.toml"), &full, &all)
             .unwrap_or_else(|errors| panic!("{full}\n{}", render(&errors, false)));
+        // Without the examples they change nothing.
+        let mut comment = String::new();
+        let mut defaults = String::new();
+        for line in held_lines(&text) {
+            let body = line.strip_prefix("# ").unwrap_or(line);
+            let code = body.split_once(" = ").is_some_and(|(key, _)| !key.contains(' '));
+            if code && !comment.contains("this is an example") && !defaults.contains("[settings.") {
+                defaults = defaults + body + "\n";
+            }
+            if body.starts_with('[') {
+                defaults = defaults
+                    + if body == "[settings]" {
+                        "[settings]\n"
+                    } else {
+                        "# [settings.\n"
+                    };
+            }
+            comment = if code { String::new() } else { comment + " " + body };
+        }
+        let parse = |text: &str| Experiment::parse(Path::new("defaults.toml"), text, &all).expect("an experiment");
+        let (given, silent) = (parse(&format!("{rest}{defaults}")), parse(&rest));
+        assert_eq!(
+            method.canonical(given.settings),
+            method.canonical(silent.settings),
+            "{defaults}"
+        );
         assert!(paths(method.settings()).len() <= held.lines().count() + 1, "{held}");
     }
 }

@@ -155,6 +155,64 @@ fn an_axis_comes_before_a_figure_or_trace_of_its_name() {
 }
 
 #[test]
+fn a_figure_against_a_figure_is_no_trace() {
+    // The rows have a trace of the same name.
+    let mut rows = sample::rows();
+    for (place, row) in rows.iter_mut().enumerate() {
+        row.record.result.metrics.insert("iteration".into(), place as f64);
+    }
+    let plot = Plot {
+        series: vec!["energy".into()],
+        ..plot("iteration", "d_ma", false)
+    };
+    assert!(
+        rows.iter()
+            .any(|row| row.record.result.traces.contains_key("iteration"))
+    );
+    let chart = plot::chart(&sample::experiment(), &plot, &rows);
+    assert!(
+        chart
+            .series
+            .iter()
+            .all(|one| one.points.len() <= 2 && one.phases.is_empty())
+    );
+    assert!(!chart.series.is_empty());
+}
+
+#[test]
+fn many_series_share_colours_by_the_first_axis_and_shapes_by_the_others() {
+    let mut rows = Vec::new();
+    for (row, family) in sample::study().0.iter().take(12).zip([0, 1, 2].repeat(4)) {
+        let mut row = row.clone();
+        row.axes[0].1 = format!("family {family}").into();
+        row.axes[1].1 = (rows.len() / 3).into();
+        rows.push(row);
+    }
+    let plot = Plot {
+        series: vec!["family".into(), "seed".into()],
+        ..plot("h", "error", true)
+    };
+    let chart = plot::chart(&sample::experiment(), &plot, &rows);
+    assert_eq!(chart.series.len(), 12);
+    for (left, right) in chart
+        .series
+        .iter()
+        .flat_map(|left| chart.series.iter().map(move |right| (left, right)))
+    {
+        let parts = |one: &plot::Series| {
+            one.name
+                .split_once(", ")
+                .map(|(a, b)| (a.to_owned(), b.to_owned()))
+                .unwrap()
+        };
+        assert_eq!(left.look.colour == right.look.colour, parts(left).0 == parts(right).0);
+        assert_eq!(left.look.shape == right.look.shape, parts(left).1 == parts(right).1);
+    }
+    // A number says which axis it is of.
+    assert_eq!(chart.series[0].name, "family 0, seed 0");
+}
+
+#[test]
 fn what_cannot_be_shown_on_a_plot_is_told() {
     let (mut rows, _) = sample::study();
     rows[3].record.result.metrics.insert("error".into(), -1.0);

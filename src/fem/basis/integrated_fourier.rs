@@ -25,8 +25,10 @@ impl Basis for IntegratedFourier {
     }
 
     fn kernel(&self, j: usize, s: f64) -> [f64; 2] {
-        let (y, sign) = mirrored(j, 0.5 * (1.0 + s));
-        let turn = if s <= 0.0 { 1.0 } else { -1.0 };
+        // Both by x: it may round to 0.5 where s is not 0 but tiny.
+        let x = 0.5 * (1.0 + s);
+        let (y, sign) = mirrored(j, x);
+        let turn = if x <= 0.5 { 1.0 } else { -1.0 };
         let frequency = j as f64 * PI;
         let a = frequency * y;
         let (sinc, slope) = if a.abs() < 0.1 {

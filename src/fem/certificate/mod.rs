@@ -40,7 +40,8 @@ pub enum Verdict {
     Positive(f64),
     /// At this canonical point the determinant is this, and not positive.
     Negative([f64; 3], f64),
-    /// Neither, with the parts allowed used up: the determinant is at least this, which is not positive.
+    /// Neither, with the parts allowed used up: the determinant is at least this, which is not positive. Parts not
+    /// looked at yet count with the bound of the part they were cut from, so this may be far too low.
     Undecided(f64),
 }
 

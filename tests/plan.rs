@@ -256,12 +256,8 @@ fn the_template_of_every_method_plans() {
                 defaults = defaults + body + "\n";
             }
             if body.starts_with('[') {
-                defaults = defaults
-                    + if body == "[settings]" {
-                        "[settings]\n"
-                    } else {
-                        "# [settings.\n"
-                    };
+                let whole = body == "[settings]";
+                defaults += if whole { "[settings]\n" } else { "# [settings.\n" };
             }
             comment = if code { String::new() } else { comment + " " + body };
         }

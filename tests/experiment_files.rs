@@ -213,6 +213,10 @@ fn series_that_join_different_jobs_are_told() {
     let one = "x = \"h\"\ny = \"l2_error\"\nseries = \"order\"\nwhere = { energy = \"arap\" }\n";
     assert_eq!(told(one), "");
     assert!(told("x = \"order\"\ny = \"l2_error\"\nseries = \"energy\"\n").contains("differ in model.tetrahedra |"));
+    // What is zipped with an axis of the series is told with it.
+    let zipped = "[vary]\n\"model.tetrahedra\" = [100, 200]\n[[zip]]\nenergy = [\"arap\", \"stretch\"]\n\
+                  solver = [\"newton\", \"l-bfgs\"]\n[[rate]]\nx = \"h\"\ny = \"l2_error\"\nseries = \"energy\"\n";
+    assert_eq!(after_head(zipped), "");
 }
 
 #[test]

@@ -10,7 +10,7 @@ use crate::experiment::grid;
 use crate::experiment::nearest::{list, suggestion};
 use crate::experiment::section::{PLOT, RATE, TABLE};
 use serde_json::Value;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
 /// Names of files that a report writes by itself.
@@ -281,11 +281,19 @@ fn mingled(
         let told = series.contains(&axis.name) || refining.contains(&axis.name);
         !(told || seed(&axis.name) || measured && numeric(axis))
     };
-    let jobs = || context.points.iter().filter(|point| grid::matches(condition, point));
+    // Within a series alone: an axis that is zipped with one of the series goes with it.
     let differ = |name: &str| {
-        let mut values = jobs().filter_map(|point| point.iter().find(|(axis, _)| axis == name).map(|(_, value)| value));
-        let first = values.next();
-        values.any(|value| Some(value) != first)
+        let mut known = BTreeMap::new();
+        let mut jobs = context.points.iter().filter(|point| grid::matches(condition, point));
+        jobs.any(|point| {
+            let told: Vec<_> = point
+                .iter()
+                .filter(|(axis, _)| series.contains(axis))
+                .cloned()
+                .collect();
+            let value = point.iter().find(|(axis, _)| axis == name).map(|(_, value)| value);
+            *known.entry(grid::describe(&told)).or_insert(value) != value
+        })
     };
     let names: Vec<&str> = context
         .axes

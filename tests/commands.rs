@@ -38,6 +38,22 @@ fn experiment(folder: &Path, text: &str, arguments: &[&str]) -> (Option<i32>, St
 }
 
 #[test]
+fn the_report_of_another_file_is_not_overwritten_in_silence() {
+    let folder = folder();
+    let (_, _, errors) = experiment(folder.path(), SMALL, &["run", "small.toml", "-q"]);
+    assert!(!errors.contains("held the report"), "{errors}");
+    let (_, _, errors) = experiment(folder.path(), SMALL, &["run", "small.toml", "-q"]);
+    assert!(!errors.contains("held the report"), "{errors}");
+    std::fs::create_dir(folder.path().join("other")).unwrap();
+    std::fs::copy(folder.path().join("small.toml"), folder.path().join("other/small.toml")).unwrap();
+    let (_, _, errors) = experiment(folder.path(), SMALL, &["run", "other/small.toml", "-q"]);
+    assert!(
+        errors.contains("held the report of") && errors.contains("rename one of"),
+        "{errors}"
+    );
+}
+
+#[test]
 fn a_second_run_comes_from_the_store() {
     let folder = folder();
     let (code, output, errors) = experiment(folder.path(), SMALL, &["run", "small.toml"]);

@@ -19,7 +19,7 @@
 //! / 80 D`, `s^2` the area of the connected part of the domain and `h` its mean edge length, goes on converging as
 //! `h^2` on structured and perturbed meshes as fine as were tried; on Delaunay meshes with random vertices the error
 //! falls as `h^2` to some 192 cells a unit length and more slowly, about as `h`, beyond. Larger factors than 1 gain
-//! nothing, smaller ones than 1/4 make it grow as their inverse.
+//! nothing there, smaller ones make the error grow: 2.6 times at 1/4 and 15 times at 1/16 on the finest mesh tried.
 
 use super::domain::{Domain, Place};
 use crate::fem::surface::SurfaceOperators;

@@ -13,6 +13,7 @@
 pub mod adaptivity;
 pub mod chart;
 pub mod distances;
+pub mod fields;
 pub mod files;
 mod fit;
 pub mod metrics;
@@ -67,7 +68,7 @@ impl Method for VolumeFit {
     }
 
     fn settings(&self) -> &'static [Field] {
-        settings::FIELDS
+        fields::FIELDS
     }
 
     fn check(&self, settings: &Value) -> Vec<(String, String)> {
@@ -106,11 +107,11 @@ impl Method for VolumeFit {
             }
         };
         let kinds: [(bool, &str, &[&str]); 2] = [
-            (template.shell.is_some(), "a shell", settings::WITHOUT_EFFECT_ON_SHELLS),
+            (template.shell.is_some(), "a shell", fields::WITHOUT_EFFECT_ON_SHELLS),
             (
                 settings.levels > 0,
                 "a subdivision volume",
-                settings::WITHOUT_EFFECT_ON_SUBDIVISIONS,
+                fields::WITHOUT_EFFECT_ON_SUBDIVISIONS,
             ),
         ];
         for (_, kind, fields) in kinds.iter().filter(|kind| kind.0) {

@@ -11,7 +11,7 @@ use vargeo::mesh::format::Content;
 use vargeo::mesh::mixed::MixedMesh;
 use vargeo::mesh::template::{carve, collapse, extrude, grid, pillow, voxels};
 use vargeo::method::model::{LoadedModel, Part};
-use vargeo::method::volume_fit::VolumeFit;
+use vargeo::method::volume_fit::{VolumeFit, orientation};
 use vargeo::method::{Failure, Inputs, Method, Outcome};
 use vargeo::optimize::Silent;
 
@@ -142,10 +142,50 @@ fn bad_input_is_named() {
     assert!(notices(&open).contains("3 have one triangle"), "{}", notices(&open));
     let flipped = format!("{corners}f 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 4 1\n");
     assert!(
-        notices(&flipped).contains("3 have triangles of opposite"),
+        notices(&flipped).contains("1 of 4 are turned over"),
         "{}",
         notices(&flipped)
     );
+    // A Möbius strip closed by a disk has no inside: the projective plane of six vertices.
+    let plane = [
+        [1, 2, 3],
+        [1, 3, 4],
+        [1, 4, 5],
+        [1, 5, 6],
+        [1, 6, 2],
+        [2, 3, 5],
+        [3, 4, 6],
+        [4, 5, 2],
+        [5, 6, 3],
+        [6, 2, 4],
+    ];
+    let corners = format!("{corners}v 1 1 0\nv 0 1 1\n");
+    let faces = plane.map(|[a, b, c]| format!("f {a} {b} {c}\n")).concat();
+    let one_sided = notices(&format!("{corners}{faces}"));
+    assert!(one_sided.contains("have triangles of opposite"), "{one_sided}");
+}
+
+#[test]
+fn triangles_that_face_opposite_ways_are_turned_to_enclose_what_lies_between() {
+    // A cube with a cavity: the boundary of a template has both the right way round.
+    let block = grid::selected([3, 3, 3], |cell| cell != [1, 1, 1]);
+    let topology = block.topology().unwrap();
+    let right = topology.boundary_triangles(&block.points);
+    assert_eq!(right.enclosed_volume(), 26.0);
+    let mut surface = right.clone();
+    assert_eq!(orientation::orient(&mut surface), 0);
+    for (index, cell) in surface.cells.iter_mut().enumerate() {
+        if index * index % 5 == 1 {
+            cell.swap(0, 1);
+        }
+    }
+    let turned = (0..surface.cells.len()).filter(|index| index * index % 5 == 1).count();
+    assert_eq!(orientation::orient(&mut surface), turned);
+    assert!((surface.enclosed_volume() - 26.0).abs() < 1e-12);
+    // Open: left alone.
+    surface.cells.pop();
+    surface.cells[0].swap(0, 1);
+    assert_eq!(orientation::orient(&mut surface), 0);
 }
 
 /// Euler characteristic of the boundary and volume.

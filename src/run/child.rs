@@ -9,8 +9,10 @@ use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::mpsc::Sender;
 use std::time::{Duration, Instant};
 
-/// After the soft limit, which the process itself keeps, the process is killed.
+/// After the soft limit, which the process itself keeps between two iterations, the process is killed: then, or a
+/// fiftieth of the limit later, for those of long limits have long iterations.
 pub(super) const GRACE: Duration = Duration::from_secs(1);
+const SHARE_OF_LIMIT: u32 = 50;
 /// The phase in which a method measures what it has, also after the soft limit: a result that is there is not thrown
 /// away.
 const MEASURING: &str = "measure";
@@ -132,9 +134,11 @@ impl Running {
     /// The time limit counts from now.
     fn start_clock(&mut self) {
         self.started = Instant::now();
-        self.deadline = self
-            .limit
-            .and_then(|limit| self.started.checked_add(limit)?.checked_add(GRACE));
+        self.deadline = self.limit.and_then(|limit| {
+            self.started
+                .checked_add(limit)?
+                .checked_add(GRACE.max(limit / SHARE_OF_LIMIT))
+        });
     }
 
     /// Takes note of what was heard.

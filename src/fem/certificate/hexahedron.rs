@@ -117,7 +117,7 @@ impl Certifier {
         Verdict::Positive(bound)
     }
 
-    fn hexahedron_determinant(
+    pub(super) fn hexahedron_determinant(
         &self,
         order: usize,
         coefficients: &[[f64; 3]],

@@ -19,6 +19,8 @@ mod double_double;
 mod bernstein;
 mod chebyshev;
 mod interval;
+mod lattice;
+mod polynomial;
 mod hexahedron;
 mod prism;
 mod tetrahedron;
@@ -26,11 +28,14 @@ mod tetrahedron;
 use super::basis::Basis;
 use super::batches::in_frame;
 use super::space::{Kind, Space};
+use crate::fem::functions::{line_table, tetrahedron_table, triangle_table};
 use crate::linalg::vector3::{Columns, add, apply, cofactor, dot, subtract, times};
 use crate::mesh::mixed::Shape;
 use bernstein::{Conversion, line_conversion, tetrahedron_conversion, triangle_conversion};
 use interval::Interval;
+use lattice::Lattice;
 use nalgebra::DMatrix;
+use polynomial::{Converted, prism_last};
 use std::collections::BTreeMap;
 
 /// What could be shown of a cell.
@@ -56,6 +61,11 @@ pub struct Certifier {
     tetrahedra: BTreeMap<usize, Conversion<3>>,
     /// Functions on dyadic intervals: `(order, level, index)`.
     intervals: BTreeMap<(usize, u32, u32), Interval>,
+    /// By number of corners and degree.
+    lattices: BTreeMap<(usize, usize), Lattice>,
+    /// Polynomials alone: triangle functions by order and the corner c of those inside, tetrahedron functions by order.
+    triangle_functions: BTreeMap<(usize, usize), Converted>,
+    tetrahedron_functions: BTreeMap<usize, Converted>,
 }
 
 /// Relative error of a conversion whose inverse matrix has this norm.
@@ -79,6 +89,9 @@ impl Certifier {
             triangles: BTreeMap::new(),
             tetrahedra: BTreeMap::new(),
             intervals: BTreeMap::new(),
+            lattices: BTreeMap::new(),
+            triangle_functions: BTreeMap::new(),
+            tetrahedron_functions: BTreeMap::new(),
         };
         for kind in kinds {
             let degree = result.degree(kind.order);
@@ -100,6 +113,9 @@ impl Certifier {
                         .or_insert_with(|| tetrahedron_conversion(degree));
                 }
             }
+            if result.polynomial(kind.order) {
+                result.prepare(kind);
+            }
             if kind.shape != Shape::Tetrahedron {
                 // The coarsest intervals serve every cell.
                 for level in 0..4 {
@@ -111,6 +127,72 @@ impl Certifier {
             }
         }
         result
+    }
+
+    /// What cells of polynomials need.
+    fn prepare(&mut self, kind: Kind) {
+        let (basis, order) = (self.basis, kind.order);
+        let corners: &[usize] = match kind.shape {
+            Shape::Hexahedron => &[2],
+            Shape::Prism => &[2, 3],
+            Shape::Tetrahedron => &[4],
+        };
+        for &corners in corners {
+            self.lattices
+                .entry((corners, order))
+                .or_insert_with(|| Lattice::new(corners, order));
+        }
+        match kind.shape {
+            Shape::Hexahedron => {}
+            Shape::Prism => {
+                for level in 0..=order.min(2) {
+                    let last = prism_last(kind, level);
+                    let conversion = &self.triangles[&order];
+                    self.triangle_functions.entry((order, last)).or_insert_with(|| {
+                        let table = triangle_table(basis, order, last, &conversion.points);
+                        Converted::new(&conversion.matrix, conversion.norm, table.functions, &table.values)
+                    });
+                }
+            }
+            Shape::Tetrahedron => {
+                let conversion = &self.tetrahedra[&order];
+                self.tetrahedron_functions.entry(order).or_insert_with(|| {
+                    let table = tetrahedron_table(basis, order, &conversion.points);
+                    Converted::new(&conversion.matrix, conversion.norm, table.functions, &table.values)
+                });
+            }
+        }
+    }
+
+    /// The determinant at a canonical point.
+    fn determinant_at(&self, kind: Kind, coefficients: &[[f64; 3]], inverse: &Columns<f64>, point: [f64; 3]) -> f64 {
+        let (basis, order) = (self.basis, kind.order);
+        let mut raw = [[0.0; 3]; 3];
+        match kind.shape {
+            Shape::Hexahedron => return self.hexahedron_determinant(order, coefficients, inverse, point),
+            Shape::Prism => {
+                let line = line_table(basis, order, &[point[2]]);
+                let functions = coefficients.len() / (order + 1);
+                for level in 0..=order {
+                    let triangle = triangle_table(basis, order, prism_last(kind, level), &[[point[0], point[1]]]);
+                    let (value, slope) = (line.values[level], line.derivatives[0][level]);
+                    for function in 0..functions {
+                        let c = coefficients[level * functions + function];
+                        raw[0] = add(raw[0], times(c, triangle.derivatives[0][function] * value));
+                        raw[1] = add(raw[1], times(c, triangle.derivatives[1][function] * value));
+                        raw[2] = add(raw[2], times(c, triangle.values[function] * slope));
+                    }
+                }
+            }
+            Shape::Tetrahedron => {
+                let table = tetrahedron_table(basis, order, &[point]);
+                for (function, &c) in coefficients.iter().enumerate() {
+                    let slopes = [0, 1, 2].map(|direction| table.derivatives[direction][function]);
+                    accumulate(&mut raw, &slopes.map(|slope| times(c, slope)), 1.0);
+                }
+            }
+        }
+        determinant(&apply_right(&raw, inverse))
     }
 
     /// Whether all functions of an order are polynomials.
@@ -155,6 +237,7 @@ impl Certifier {
         // Columns of A^-1: entry (row, column) is cof[row][column] / det.
         let inverse: Columns<f64> = [0, 1, 2].map(|column| [0, 1, 2].map(|row| cof[row][column] / determinant));
         let verdict = match slots.kind.shape {
+            _ if self.polynomial(slots.kind.order) => self.polynomial_cell(slots.kind, &coefficients, &inverse),
             Shape::Hexahedron => self.hexahedron(slots.kind, &coefficients, &inverse),
             Shape::Prism => self.prism(slots.kind, &coefficients, &inverse),
             Shape::Tetrahedron => self.tetrahedron(slots.kind, &coefficients, &inverse),

@@ -6,7 +6,7 @@ use super::shell::{self, Shell};
 use super::surface_energy::Scale;
 use super::target::{Closure, Target};
 use super::template::{Template, transform};
-use super::{COUNTERS, adaptivity, invalid, quality, subdivision, untangle, validity};
+use super::{COUNTERS, adaptivity, invalid, orientation, quality, subdivision, untangle, validity};
 use crate::energy::mapping::Density;
 use crate::fem::batches::{Batches, reference_volume, references_of_volume};
 use crate::fem::space::{Kind, Space};
@@ -90,6 +90,18 @@ impl<'a> Fit<'a> {
                 *column = column.map(|coordinate| coordinate / unit);
             }
             shell.surface.points.copy_from_slice(&volume.points[..shell.base]);
+        }
+        // A shell turns its surface itself when it is grown.
+        let turned = if shell.is_none() {
+            orientation::orient(&mut target.surface)
+        } else {
+            0
+        };
+        if turned > 0 {
+            notices.push(format!(
+                "triangles of the target face opposite ways: {turned} of {} are turned over, so that all enclose a volume",
+                target.surface.cells.len()
+            ));
         }
         target.place_sites();
         let topology = volume.topology().map_err(invalid)?;

@@ -19,6 +19,7 @@ mod fit;
 pub mod metrics;
 pub mod model;
 pub mod objective;
+pub mod orientation;
 pub mod outcome;
 pub mod picture;
 pub mod preconditioner;
@@ -52,7 +53,7 @@ impl Method for VolumeFit {
     }
 
     fn version(&self) -> u32 {
-        3
+        4
     }
 
     fn summary(&self) -> &'static str {

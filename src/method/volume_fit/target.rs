@@ -161,6 +161,8 @@ fn cloud(name: &str, bytes: &[u8]) -> Result<Option<Vec<[f64; 3]>>, Failure> {
 pub struct Closure {
     /// The triangles over vertices that are one where they are at one place; those with a vertex twice are left out.
     pub joined: TriangleMesh,
+    /// For each of them its number in the surface.
+    pub kept: Vec<usize>,
     pub edges: usize,
     /// Edges with one triangle.
     pub open: usize,
@@ -187,9 +189,13 @@ impl Closure {
             .cells
             .iter()
             .map(|cell| cell.map(|corner| names[corner as usize]));
+        let (kept, cells) = cells
+            .enumerate()
+            .filter(|(_, [a, b, c])| a != b && b != c && c != a)
+            .unzip();
         let joined = TriangleMesh {
             points: Vec::new(),
-            cells: cells.filter(|[a, b, c]| a != b && b != c && c != a).collect(),
+            cells,
         };
         let mut sides = BTreeMap::<[u32; 2], [usize; 2]>::new();
         for cell in &joined.cells {
@@ -204,6 +210,7 @@ impl Closure {
             open: count(&|sides| sides[0] + sides[1] == 1),
             turned: count(&|sides| sides[0] + sides[1] > 1 && sides[0] != sides[1]),
             joined,
+            kept,
         }
     }
 

@@ -1,0 +1,659 @@
+//! Cells whose functions are polynomials: Bernstein coefficients of the position, cut in two again and again.
+//!
+//! A cell is a product of simplices: lines, or a line and a triangle, or a tetrahedron. Its position on a part has
+//! Bernstein coefficients b; those of the derivative along an edge of a simplex of degree p are differences of b, raised
+//! to degree p again so that all three derivatives together make control matrices. Where the proof fails the part is cut
+//! in the middle of the edge along which the control matrices differ most, by de Casteljau's algorithm: averages only,
+//! so a rounding error stays what it is but for half a unit in the last place a step. Against derivatives by the part's own
+//! coordinates, which halve with every cut, it grows; a part of a hexahedron where it matters is computed anew.
+
+use super::lattice::Lattice;
+use super::{Certifier, NEGATIVE, Verdict, determinant, frobenius, rounding};
+use crate::fem::space::Kind;
+use crate::linalg::lanes::{Lanes, Vector, WIDTH};
+use crate::linalg::processor::{Kernel, Processor};
+use crate::linalg::vector3::{Columns, add, cofactor, dot, subtract, times};
+use crate::mesh::mixed::Shape;
+use nalgebra::DMatrix;
+
+/// Cuts of a part at most.
+const MOST_CUTS: i32 = 60;
+
+/// Parts allowed against those of cells that are cut into eight: two halves are a third of the way there.
+const HALVES: usize = 4;
+
+/// Rounding that does not matter for the proof: a share of the control matrices.
+const PRECISE: f64 = 0.01;
+
+/// Half a unit in the last place of 1.
+const UNIT: f64 = 0.5 * f64::EPSILON;
+
+/// The functions of a triangle or tetrahedron in Bernstein form: a row a coefficient, a column a function.
+#[derive(Clone, Debug)]
+pub(super) struct Converted {
+    pub(super) matrix: DMatrix<f64>,
+    /// For each function a bound of the error of its coefficients.
+    pub(super) errors: Vec<f64>,
+}
+
+impl Converted {
+    /// From values at the points of a conversion, entry `functions * point + function`.
+    pub(super) fn new(conversion: &DMatrix<f64>, norm: f64, functions: usize, values: &[f64]) -> Converted {
+        let sampled = DMatrix::from_row_slice(conversion.ncols(), functions, values);
+        let sizes = sampled.column_iter().map(|column| column.amax());
+        let errors = sizes.map(|size| rounding(norm) * size).collect();
+        Converted {
+            matrix: conversion * sampled,
+            errors,
+        }
+    }
+}
+
+/// A factor of a cell with its place among the indices of the coefficients.
+struct Factor<'a> {
+    lattice: &'a Lattice,
+    outer: usize,
+    inner: usize,
+    /// The cell's direction of its first coordinate.
+    direction: usize,
+}
+
+/// A part of a cell.
+struct Part {
+    /// Three rows of coefficients, one a component.
+    positions: Vec<f64>,
+    /// The canonical coordinates of the corners of every factor, each 0 in the directions of other factors.
+    corners: [[[f64; 3]; 4]; 3],
+    cuts: i32,
+    /// Cuts when the coefficients were computed, and a bound of their error then.
+    since: i32,
+    error: f64,
+}
+
+/// The cell with what its parts share.
+struct Cell<'a> {
+    factors: Vec<Factor<'a>>,
+    points: usize,
+    /// `points` rounded up to whole lanes: the length of a row of control matrices.
+    stride: usize,
+    degree: usize,
+    /// Bounds the coefficients.
+    size: f64,
+    processor: Processor,
+    /// Entry (row, column) of the control matrices in row `3 column + row`.
+    control: Vec<f64>,
+    /// The symmetric parts of `J0^-1 J`: (0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2).
+    symmetric: Vec<f64>,
+    /// Two rows of coefficients for a cut.
+    first: Vec<f64>,
+    second: Vec<f64>,
+    unused: Vec<Vec<f64>>,
+}
+
+impl Certifier {
+    pub(super) fn polynomial_cell(&self, kind: Kind, coefficients: &[[f64; 3]], inverse: &Columns<f64>) -> Verdict {
+        let own = self.centred(kind, coefficients);
+        let (positions, error) = self.positions(kind, &own, [(0, 0); 3]);
+        let order = kind.order;
+        let points = positions.len() / 3;
+        let factor = |corners: usize, outer: usize, direction: usize| {
+            let lattice = &self.lattices[&(corners, order)];
+            Factor {
+                lattice,
+                outer,
+                inner: points / outer / lattice.points,
+                direction,
+            }
+        };
+        let n = order + 1;
+        let factors = match kind.shape {
+            Shape::Hexahedron => vec![factor(2, 1, 0), factor(2, n, 1), factor(2, n * n, 2)],
+            Shape::Prism => vec![factor(2, 1, 2), factor(3, n, 0)],
+            Shape::Tetrahedron => vec![factor(4, 1, 0)],
+        };
+        let mut corners = [[[0.0; 3]; 4]; 3];
+        for (factor, corners) in factors.iter().zip(&mut corners) {
+            for corner in 1..factor.lattice.corners {
+                corners[corner][factor.direction + corner - 1] = 1.0;
+            }
+        }
+        let stride = points.next_multiple_of(WIDTH);
+        let mut cell = Cell {
+            points,
+            stride,
+            degree: order,
+            size: positions.iter().fold(0.0, |most, value| value.abs().max(most)),
+            processor: Processor::detect(),
+            control: vec![0.0; 9 * stride],
+            symmetric: vec![0.0; 6 * stride],
+            first: Vec::new(),
+            second: Vec::new(),
+            unused: Vec::new(),
+            factors,
+        };
+        let whole = Part {
+            positions,
+            corners,
+            cuts: 0,
+            since: 0,
+            error,
+        };
+        let most = HALVES * self.most(kind);
+        let scale = determinant(inverse);
+        let mut stack = vec![whole];
+        let (mut parts, mut bound) = (0, f64::INFINITY);
+        while let Some(mut part) = stack.pop() {
+            parts += 1;
+            // The determinant on a part against that on the cell.
+            let scale = 2.0_f64.powi(part.cuts) * scale;
+            let mut proved = cell.prove(&part);
+            if proved.is_err_and(|delta| delta > PRECISE) && part.cuts > part.since && kind.shape == Shape::Hexahedron {
+                (part.positions, part.error) = self.positions(kind, &own, intervals(&part));
+                part.since = part.cuts;
+                proved = cell.prove(&part);
+            }
+            if let Ok(least) = proved {
+                bound = bound.min(scale * least);
+                cell.unused.push(part.positions);
+                continue;
+            }
+            if let Some(point) = cell.suspect(&part, scale) {
+                let value = self.determinant_at(kind, coefficients, inverse, point);
+                if !(value > NEGATIVE) {
+                    return Verdict::Negative(point, value);
+                }
+            }
+            if parts + stack.len() >= most || part.cuts >= MOST_CUTS {
+                stack.push(part);
+                let roughs = stack.iter().map(|part| {
+                    cell.differentiate(part);
+                    2.0_f64.powi(part.cuts) * determinant(inverse) * cell.rough(part)
+                });
+                return Verdict::Undecided(roughs.fold(f64::INFINITY, f64::min));
+            }
+            stack.extend(cell.cut(part));
+        }
+        Verdict::Positive(bound)
+    }
+
+    /// The coefficients with the origin in the middle of the vertices, where they are small.
+    fn centred(&self, kind: Kind, coefficients: &[[f64; 3]]) -> Vec<[f64; 3]> {
+        let n = kind.order + 1;
+        // The functions of the vertices, which add up to 1.
+        let vertices: Vec<usize> = match kind.shape {
+            Shape::Hexahedron => (0..8)
+                .map(|place| ((place >> 2) * n + (place >> 1 & 1)) * n + (place & 1))
+                .collect(),
+            Shape::Prism => {
+                let functions = coefficients.len() / n;
+                (0..2)
+                    .flat_map(|level| (0..3).map(move |corner| level * functions + corner))
+                    .collect()
+            }
+            Shape::Tetrahedron => (0..4).collect(),
+        };
+        let sum = vertices
+            .iter()
+            .fold([0.0; 3], |sum, &vertex| add(sum, coefficients[vertex]));
+        let middle = times(sum, 1.0 / vertices.len() as f64);
+        let mut own = coefficients.to_vec();
+        for vertex in vertices {
+            own[vertex] = subtract(own[vertex], middle);
+        }
+        own
+    }
+
+    /// The coefficients of the position by component, and a bound of their error: on the box of these intervals, each a
+    /// level and a number, for hexahedra, on the whole cell for others.
+    fn positions(&self, kind: Kind, own: &[[f64; 3]], box_of: [(u32, u32); 3]) -> (Vec<f64>, f64) {
+        let n = kind.order + 1;
+        // Rounding in the sums, relative to the sizes of the terms.
+        const SUMS: f64 = 1e-14;
+        let mut error = [0.0; 3];
+        let mut term = |c: [f64; 3], size: f64, wrong: f64| {
+            for (error, c) in error.iter_mut().zip(c) {
+                *error += c.abs() * (wrong + SUMS * size);
+            }
+        };
+        let list: Vec<[f64; 3]> = match kind.shape {
+            Shape::Hexahedron => {
+                let lines = box_of.map(|(level, index)| self.interval(kind.order, level, index));
+                for (place, &c) in own.iter().enumerate() {
+                    let functions = [place / (n * n), place / n % n, place % n];
+                    let (mut high, mut low) = (1.0, 1.0);
+                    for (line, function) in lines.iter().zip(functions) {
+                        high *= line.value_sizes[function];
+                        low *= line.value_sizes[function] - line.value_errors[function];
+                    }
+                    term(c, high, high - low);
+                }
+                let last = contract(own, n * n, &lines[2].values, n, 1);
+                let second = contract(&last, n, &lines[1].values, n, n);
+                contract(&second, 1, &lines[0].values, n, n * n)
+            }
+            Shape::Prism => {
+                let line = self.interval(kind.order, 0, 0);
+                let functions = own.len() / n;
+                let mut levels = Vec::with_capacity(own.len());
+                for (level, own) in own.chunks_exact(functions).enumerate() {
+                    let triangle = &self.triangle_functions[&(kind.order, prism_last(kind, level))];
+                    levels.extend(products(&triangle.matrix, own));
+                    for (function, &c) in own.iter().enumerate() {
+                        let (most, wrong) = (triangle.matrix.column(function).amax(), triangle.errors[function]);
+                        let high = (most + wrong) * line.value_sizes[level];
+                        let low = most * (line.value_sizes[level] - line.value_errors[level]);
+                        term(c, high, high - low);
+                    }
+                }
+                let across = levels.len() / n;
+                contract(&levels, 1, &line.values, n, across)
+            }
+            Shape::Tetrahedron => {
+                let converted = &self.tetrahedron_functions[&kind.order];
+                for (function, &c) in own.iter().enumerate() {
+                    let wrong = converted.errors[function];
+                    term(c, converted.matrix.column(function).amax() + wrong, wrong);
+                }
+                products(&converted.matrix, own)
+            }
+        };
+        let positions = (0..3)
+            .flat_map(|axis| list.iter().map(move |point| point[axis]))
+            .collect();
+        (positions, error.into_iter().fold(0.0, f64::max))
+    }
+}
+
+/// Level and number of the intervals whose product a hexahedron's part is.
+fn intervals(part: &Part) -> [(u32, u32); 3] {
+    std::array::from_fn(|axis| {
+        let [low, high] = [0, 1].map(|end| part.corners[axis][end][axis]);
+        // Powers of two: exact.
+        let share = 1.0 / (high - low);
+        (share.log2().round() as u32, (low * share) as u32)
+    })
+}
+
+/// The triangle functions of a level of line functions: bottom, top and within may differ.
+pub(super) fn prism_last(kind: Kind, level: usize) -> usize {
+    [kind.last[0], kind.last[1], 2][level.min(2)]
+}
+
+/// `sum_f matrix[row][f] c[f]` for every row.
+fn products(matrix: &DMatrix<f64>, c: &[[f64; 3]]) -> Vec<[f64; 3]> {
+    let mut result = vec![[0.0; 3]; matrix.nrows()];
+    for (column, &c) in matrix.column_iter().zip(c) {
+        for (sum, &weight) in result.iter_mut().zip(column.iter()) {
+            *sum = add(*sum, times(c, weight));
+        }
+    }
+    result
+}
+
+/// `sum_f input[o][f][i] weights[n f + row]` at `[o][row][i]`, where f and row run below n.
+fn contract(input: &[[f64; 3]], outer: usize, weights: &[f64], n: usize, inner: usize) -> Vec<[f64; 3]> {
+    let mut result = vec![[0.0; 3]; input.len()];
+    for o in 0..outer {
+        for f in 0..n {
+            let from = &input[(o * n + f) * inner..(o * n + f + 1) * inner];
+            for row in 0..n {
+                let weight = weights[f * n + row];
+                let to = &mut result[(o * n + row) * inner..(o * n + row + 1) * inner];
+                for (sum, &value) in to.iter_mut().zip(from) {
+                    *sum = add(*sum, times(value, weight));
+                }
+            }
+        }
+    }
+    result
+}
+
+impl Cell<'_> {
+    /// The control matrices of a part: derivatives by the part's own coordinates.
+    fn differentiate(&mut self, part: &Part) {
+        self.control.fill(0.0);
+        for factor in &self.factors {
+            for side in 1..factor.lattice.corners {
+                for component in 0..3 {
+                    let row = 3 * (factor.direction + side - 1) + component;
+                    self.processor.run(Derivative {
+                        lattice: factor.lattice,
+                        side,
+                        outer: factor.outer,
+                        inner: factor.inner,
+                        b: &part.positions[component * self.points..][..self.points],
+                        out: &mut self.control[row * self.stride..][..self.points],
+                    });
+                }
+            }
+        }
+        // What fills the last lanes repeats the first point.
+        for row in self.control.chunks_exact_mut(self.stride) {
+            let first = row[0];
+            row[self.points..].fill(first);
+        }
+    }
+
+    /// Bounds the error of a control matrix in the Frobenius norm, with that of its products with a matrix of norm 1.
+    fn error(&self, part: &Part) -> f64 {
+        let p = self.degree as f64;
+        let position = part.error + f64::from(part.cuts - part.since) * p * UNIT * self.size;
+        3.0 * p * (2.0 * position + 24.0 * UNIT * self.size)
+    }
+
+    fn matrix(&self, point: usize) -> Columns<f64> {
+        std::array::from_fn(|column| std::array::from_fn(|row| self.control[(3 * column + row) * self.stride + point]))
+    }
+
+    fn mean(&self) -> Columns<f64> {
+        let share = 1.0 / self.points as f64;
+        std::array::from_fn(|column| {
+            std::array::from_fn(|row| {
+                let values = &self.control[(3 * column + row) * self.stride..][..self.points];
+                values.iter().sum::<f64>() * share
+            })
+        })
+    }
+
+    /// A positive lower bound of the determinant by the part's own coordinates, from its control matrices; or else how
+    /// much of the failure is due to rounding, where 1 is all.
+    fn prove(&mut self, part: &Part) -> Result<f64, f64> {
+        self.differentiate(part);
+        let mean = self.mean();
+        let cof = cofactor(&mean);
+        let middle = dot(mean[0], cof[0]);
+        // Where the mean is of no use the identity still lets the edge to cut be chosen.
+        let rows = if middle > 0.0 {
+            cof.map(|row| times(row, 1.0 / middle))
+        } else {
+            let size = frobenius(&mean).max(f64::MIN_POSITIVE);
+            [0, 1, 2].map(|row| [0, 1, 2].map(|column| if row == column { 1.0 / size } else { 0.0 }))
+        };
+        let delta = frobenius(&rows) * self.error(part);
+        let mut least = f64::INFINITY;
+        let mut holds = true;
+        self.processor.run(Test {
+            control: &self.control,
+            stride: self.stride,
+            rows: &rows,
+            delta,
+            symmetric: &mut self.symmetric,
+            least: &mut least,
+            holds: &mut holds,
+        });
+        if middle > 0.0 && delta < 0.5 && holds {
+            Ok(middle * least)
+        } else {
+            Err(delta)
+        }
+    }
+
+    /// A corner of the part where the determinant may be negative; there control matrices are values.
+    fn suspect(&self, part: &Part, scale: f64) -> Option<[f64; 3]> {
+        let mut worst: Option<([f64; 3], f64)> = None;
+        let mut tips = vec![(0, [0.0; 3])];
+        for (factor, corners) in self.factors.iter().zip(&part.corners) {
+            tips = tips
+                .into_iter()
+                .flat_map(|(place, point)| {
+                    let own = factor.lattice.tips.iter().zip(corners);
+                    own.map(move |(tip, corner)| (place + tip * factor.inner, add(point, *corner)))
+                })
+                .collect();
+        }
+        for (place, point) in tips {
+            let matrix = self.matrix(place);
+            let value = determinant(&matrix);
+            // What rounding may make of it, by Hadamard's inequality.
+            let margin = 3.0 * self.error(part) * frobenius(&matrix).powi(2);
+            if !(scale * (value - margin) > NEGATIVE) && worst.is_none_or(|(_, other)| value < other) {
+                worst = Some((point, value));
+            }
+        }
+        worst.map(|(point, _)| point)
+    }
+
+    /// `det (J0 + D) >= det J0 - (prod (|c_i| + |d_i|) - prod |c_i|)` over all combinations, by Hadamard's inequality.
+    fn rough(&self, part: &Part) -> f64 {
+        let mean = self.mean();
+        let size = |column: [f64; 3]| dot(column, column).sqrt();
+        let (mut inner, mut outer) = (1.0, 1.0);
+        for direction in 0..3 {
+            let away = (0..self.points).map(|point| size(subtract(self.matrix(point)[direction], mean[direction])));
+            let length = size(mean[direction]);
+            inner *= length;
+            outer *= length + away.fold(0.0, f64::max) + self.error(part);
+        }
+        (determinant(&mean) - (outer - inner)).min(0.0)
+    }
+
+    /// The factor and the edge along which the symmetric parts change most: ends and middles of rows are compared.
+    fn longest(&self) -> (usize, usize) {
+        let mut best = (0, 0, f64::NEG_INFINITY);
+        for (index, factor) in self.factors.iter().enumerate() {
+            let (inner, points) = (factor.inner, factor.lattice.points);
+            for (edge, (_, rows)) in factor.lattice.edges.iter().enumerate() {
+                let mut change = 0.0;
+                let mut count = 0;
+                for row in rows {
+                    let [start, middle, end] = [row[0], row[row.len() / 2], row[row.len() - 1]];
+                    count += factor.outer * inner;
+                    for values in self.symmetric.chunks_exact(self.stride) {
+                        for o in 0..factor.outer {
+                            let at = |place: usize| &values[(o * points + place) * inner..][..inner];
+                            let (start, middle, end) = (at(start), at(middle), at(end));
+                            for i in 0..inner {
+                                let (a, b) = (middle[i] - start[i], end[i] - middle[i]);
+                                change += a * a + b * b;
+                            }
+                        }
+                    }
+                }
+                let change = change / count as f64;
+                if change > best.2 {
+                    best = (index, edge, change);
+                }
+            }
+        }
+        (best.0, best.1)
+    }
+
+    /// Both halves of a part.
+    fn cut(&mut self, mut part: Part) -> [Part; 2] {
+        let (index, edge) = self.longest();
+        let factor = &self.factors[index];
+        let (inner, points) = (factor.inner, factor.lattice.points);
+        let ([r, s], rows) = &factor.lattice.edges[edge];
+        let mut positions = self.unused.pop().unwrap_or_default();
+        positions.clone_from(&part.positions);
+        self.processor.run(Halves {
+            rows,
+            blocks: 3 * factor.outer,
+            points,
+            inner,
+            low: &mut part.positions,
+            high: &mut positions,
+            first: &mut self.first,
+            second: &mut self.second,
+        });
+        let corners = &part.corners[index];
+        let middle = times(add(corners[*r], corners[*s]), 0.5);
+        let mut other = Part {
+            positions,
+            corners: part.corners,
+            cuts: part.cuts + 1,
+            ..part
+        };
+        other.corners[index][*r] = middle;
+        part.corners[index][*s] = middle;
+        part.cuts += 1;
+        [other, part]
+    }
+}
+
+/// Differences of coefficients along an edge from the first corner to `side`, raised to the degree of the coefficients.
+struct Derivative<'a> {
+    lattice: &'a Lattice,
+    side: usize,
+    outer: usize,
+    inner: usize,
+    b: &'a [f64],
+    /// Added to.
+    out: &'a mut [f64],
+}
+
+impl Kernel for Derivative<'_> {
+    // Plain loops, which the compiler fits to the registers of the processor.
+    #[inline(always)]
+    fn run<V: Vector>(self) {
+        let (inner, points) = (self.inner, self.lattice.points);
+        for o in 0..self.outer {
+            let b = &self.b[o * points * inner..][..points * inner];
+            let out = &mut self.out[o * points * inner..][..points * inner];
+            if inner == 1 {
+                for below in &self.lattice.below {
+                    let difference = b[below.up[self.side]] - b[below.up[0]];
+                    for corner in 0..self.lattice.corners {
+                        out[below.up[corner]] += below.weights[corner] * difference;
+                    }
+                }
+                continue;
+            }
+            for below in &self.lattice.below {
+                let from = &b[below.up[0] * inner..][..inner];
+                let to = &b[below.up[self.side] * inner..][..inner];
+                for corner in 0..self.lattice.corners {
+                    let weight = below.weights[corner];
+                    let out = &mut out[below.up[corner] * inner..][..inner];
+                    for ((out, to), from) in out.iter_mut().zip(to).zip(from) {
+                        *out += weight * (to - from);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// De Casteljau's algorithm along rows of a lattice: the half at their start in place, that at their end into `high`.
+struct Halves<'a> {
+    rows: &'a [Vec<usize>],
+    blocks: usize,
+    points: usize,
+    inner: usize,
+    low: &'a mut [f64],
+    high: &'a mut [f64],
+    first: &'a mut Vec<f64>,
+    second: &'a mut Vec<f64>,
+}
+
+impl Kernel for Halves<'_> {
+    #[inline(always)]
+    fn run<V: Vector>(self) {
+        let (inner, size) = (self.inner, self.points * self.inner);
+        let most = self.rows.iter().map(Vec::len).max().unwrap_or(0) * inner;
+        self.first.resize(most, 0.0);
+        self.second.resize(most, 0.0);
+        let (mut first, mut second) = (self.first.as_mut_slice(), self.second.as_mut_slice());
+        for block in 0..self.blocks {
+            let low = &mut self.low[block * size..][..size];
+            let high = &mut self.high[block * size..][..size];
+            for row in self.rows {
+                if inner == 1 {
+                    for (out, &place) in first.iter_mut().zip(row) {
+                        *out = low[place];
+                    }
+                } else {
+                    for (out, &place) in first.chunks_exact_mut(inner).zip(row) {
+                        out.copy_from_slice(&low[place * inner..][..inner]);
+                    }
+                }
+                for step in 1..row.len() {
+                    let count = (row.len() - step) * inner;
+                    let (a, b) = (&first[..count], &first[inner..inner + count]);
+                    for ((out, a), b) in second[..count].iter_mut().zip(a).zip(b) {
+                        *out = 0.5 * (a + b);
+                    }
+                    let (start, end) = (row[step], row[row.len() - 1 - step]);
+                    if inner == 1 {
+                        low[start] = second[0];
+                        high[end] = second[count - 1];
+                    } else {
+                        low[start * inner..][..inner].copy_from_slice(&second[..inner]);
+                        high[end * inner..][..inner].copy_from_slice(&second[count - inner..count]);
+                    }
+                    std::mem::swap(&mut first, &mut second);
+                }
+            }
+        }
+    }
+}
+
+/// Whether the symmetric parts of `rows J`, less `delta` on their diagonals, are all positive definite, and the least of
+/// their determinants.
+struct Test<'a> {
+    control: &'a [f64],
+    stride: usize,
+    rows: &'a Columns<f64>,
+    delta: f64,
+    symmetric: &'a mut [f64],
+    least: &'a mut f64,
+    holds: &'a mut bool,
+}
+
+impl Kernel for Test<'_> {
+    #[inline(always)]
+    fn run<V: Vector>(self) {
+        let load = |values: &[f64]| {
+            let mut lanes = Lanes::ZERO;
+            lanes.0.copy_from_slice(&values[..WIDTH]);
+            V::load(&lanes)
+        };
+        let mut rows = [[V::constant(0.0); 3]; 3];
+        for row in 0..3 {
+            for column in 0..3 {
+                rows[row][column] = V::constant(self.rows[row][column]);
+            }
+        }
+        let (delta, threshold, half) = (V::constant(self.delta), V::constant(1e-14), V::constant(0.5));
+        let mut least = V::constant(f64::INFINITY);
+        for place in (0..self.stride).step_by(WIDTH) {
+            let mut m = [[V::constant(0.0); 3]; 3];
+            for column in 0..3 {
+                let mut values = [V::constant(0.0); 3];
+                for row in 0..3 {
+                    values[row] = load(&self.control[(3 * column + row) * self.stride + place..]);
+                }
+                for row in 0..3 {
+                    m[row][column] = rows[row][0] * values[0] + rows[row][1] * values[1] + rows[row][2] * values[2];
+                }
+            }
+            let entries = [
+                m[0][0],
+                half * (m[0][1] + m[1][0]),
+                half * (m[0][2] + m[2][0]),
+                m[1][1],
+                half * (m[1][2] + m[2][1]),
+                m[2][2],
+            ];
+            for (entry, value) in entries.iter().enumerate() {
+                let mut lanes = Lanes::ZERO;
+                value.store(&mut lanes);
+                self.symmetric[entry * self.stride + place..][..WIDTH].copy_from_slice(&lanes.0);
+            }
+            let [a, b, c, d, e, f] = entries;
+            let (a, d, f) = (a - delta, d - delta, f - delta);
+            let minor = a * d - b * b;
+            let whole = f * minor - a * e * e + (b + b) * c * e - c * c * d;
+            let good = threshold.less(a) & threshold.less(minor) & threshold.less(whole);
+            if V::bits(good) != u8::MAX {
+                *self.holds = false;
+            }
+            least = least.min(whole);
+        }
+        *self.least = if *self.holds {
+            least.smallest()
+        } else {
+            f64::NEG_INFINITY
+        };
+    }
+}

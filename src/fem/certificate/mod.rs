@@ -2,7 +2,7 @@
 //!
 //! On a box, prism or tetrahedron within the cell the Jacobian is a convex combination of control matrices, its Bernstein
 //! coefficients. With any fixed matrix `J0`, `det J > 0` follows when the symmetric parts of all control matrices of
-//! `J0^-1 J` are positive definite: positive definite matrices are a convex set, and `det M >= det((M + M^T) / 2)`
+//! `J0^-1 J`, or of all of `J J0^-1`, are positive definite: positive definite matrices are a convex set, and `det M >= det((M + M^T) / 2)`
 //! (Ostrowski and Taussky 1951). As the cube root of the determinant is concave there, the least of their determinants
 //! times `det J0` bounds `det J` from below. No product of polynomials is needed, unlike for Bernstein coefficients of
 //! the determinant itself (Johnen et al. 2013). Where the test fails the part is cut, until it holds, a point with a
@@ -286,26 +286,35 @@ fn prove(control: &[Columns<f64>], mean: &Columns<f64>, error: f64) -> Option<f6
     if !(delta < 0.5) {
         return None;
     }
-    let mut least = f64::INFINITY;
-    for matrix in control.iter() {
-        let m = [0, 1, 2].map(|row| [0, 1, 2].map(|column| dot(rows[row], matrix[column])));
-        let entry = |i: usize, j: usize| 0.5 * (m[i][j] + m[j][i]) - if i == j { delta } else { 0.0 };
-        let (a, b, c, d, e, f) = (
-            entry(0, 0),
-            entry(0, 1),
-            entry(0, 2),
-            entry(1, 1),
-            entry(1, 2),
-            entry(2, 2),
-        );
-        let minor = a * d - b * b;
-        let whole = f * minor - a * e * e + 2.0 * b * c * e - c * c * d;
-        if !(a > 1e-14 && minor > 1e-14 && whole > 1e-14) {
-            return None;
+    // From the left: M_ij = rows_i . column_j. From the right: the sum over k of column_k[i] rows_k[j].
+    let least = |from_left: bool| {
+        let mut least = f64::INFINITY;
+        for matrix in control.iter() {
+            let m = [0, 1, 2].map(|row| {
+                [0, 1, 2].map(|column| match from_left {
+                    true => dot(rows[row], matrix[column]),
+                    false => (0..3).map(|k| matrix[k][row] * rows[k][column]).sum(),
+                })
+            });
+            let entry = |i: usize, j: usize| 0.5 * (m[i][j] + m[j][i]) - if i == j { delta } else { 0.0 };
+            let (a, b, c, d, e, f) = (
+                entry(0, 0),
+                entry(0, 1),
+                entry(0, 2),
+                entry(1, 1),
+                entry(1, 2),
+                entry(2, 2),
+            );
+            let minor = a * d - b * b;
+            let whole = f * minor - a * e * e + 2.0 * b * c * e - c * c * d;
+            if !(a > 1e-14 && minor > 1e-14 && whole > 1e-14) {
+                return None;
+            }
+            least = least.min(whole);
         }
-        least = least.min(whole);
-    }
-    Some(middle * least)
+        Some(middle * least)
+    };
+    least(true).or_else(|| least(false))
 }
 
 /// `det (J0 + D) >= det J0 - (prod (|c_i| + |d_i|) - prod |c_i|)` over all those combinations, by Hadamard's inequality.

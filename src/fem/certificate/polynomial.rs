@@ -3,9 +3,10 @@
 //! A cell is a product of simplices: lines, or a line and a triangle, or a tetrahedron. Its position on a part has
 //! Bernstein coefficients b; those of the derivative along an edge of a simplex of degree p are differences of b, raised
 //! to degree p again so that all three derivatives together make control matrices. Where the proof fails the part is cut
-//! in the middle of the edge along which the control matrices differ most, by de Casteljau's algorithm: averages only,
-//! so a rounding error stays what it is but for half a unit in the last place a step. Against derivatives by the part's own
-//! coordinates, which halve with every cut, it grows; a part of a hexahedron where it matters is computed anew.
+//! in the middle of the longest edge of the simplex along which the control matrices differ most, by de Casteljau's
+//! algorithm: averages only, so a rounding error stays what it is but for half a unit in the last place a step. Against
+//! derivatives by the part's own coordinates, which halve with every cut, it grows; a part of a hexahedron where it matters
+//! is computed anew.
 
 use super::lattice::Lattice;
 use super::{Certifier, NEGATIVE, Verdict, determinant, frobenius, rounding};
@@ -82,7 +83,7 @@ struct Cell<'a> {
     processor: Processor,
     /// Entry (row, column) of the control matrices in row `3 column + row`.
     control: Vec<f64>,
-    /// The symmetric parts of `J0^-1 J`: (0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2).
+    /// The symmetric parts of `J J0^-1`: (0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2).
     symmetric: Vec<f64>,
     /// Two rows of coefficients for a cut.
     first: Vec<f64>,
@@ -370,22 +371,26 @@ impl Cell<'_> {
             [0, 1, 2].map(|row| [0, 1, 2].map(|column| if row == column { 1.0 / size } else { 0.0 }))
         };
         let delta = frobenius(&rows) * self.error(part);
-        let mut least = f64::INFINITY;
-        let mut holds = true;
-        self.processor.run(Test {
-            control: &self.control,
-            stride: self.stride,
-            rows: &rows,
-            delta,
-            symmetric: &mut self.symmetric,
-            least: &mut least,
-            holds: &mut holds,
-        });
-        if middle > 0.0 && delta < 0.5 && holds {
-            Ok(middle * least)
-        } else {
-            Err(delta)
+        // Turned and bent shapes, flat ones too, are near J0 from the one side, uneven parameters from the other. The edge to
+        // cut is chosen by the second.
+        for from_left in [true, false] {
+            let mut least = f64::INFINITY;
+            let mut holds = true;
+            self.processor.run(Test {
+                control: &self.control,
+                stride: self.stride,
+                rows: &rows,
+                from_left,
+                delta,
+                symmetric: &mut self.symmetric,
+                least: &mut least,
+                holds: &mut holds,
+            });
+            if middle > 0.0 && delta < 0.5 && holds {
+                return Ok(middle * least);
+            }
         }
+        Err(delta)
     }
 
     /// A corner of the part where the determinant may be negative; there control matrices are values.
@@ -427,12 +432,18 @@ impl Cell<'_> {
         (determinant(&mean) - (outer - inner)).min(0.0)
     }
 
-    /// The factor and the edge along which the symmetric parts change most: ends and middles of rows are compared.
-    fn longest(&self) -> (usize, usize) {
+    /// The factor along which the symmetric parts change most, where ends and middles of rows are compared, and its longest
+    /// edge: that of the greatest change would make needles, whose thickness is lost in rounding.
+    fn longest(&self, part: &Part) -> (usize, usize) {
         let mut best = (0, 0, f64::NEG_INFINITY);
-        for (index, factor) in self.factors.iter().enumerate() {
+        for (index, (factor, corners)) in self.factors.iter().zip(&part.corners).enumerate() {
             let (inner, points) = (factor.inner, factor.lattice.points);
-            for (edge, (_, rows)) in factor.lattice.edges.iter().enumerate() {
+            let mut edge = (0, f64::NEG_INFINITY);
+            for (number, ([r, s], rows)) in factor.lattice.edges.iter().enumerate() {
+                let side = subtract(corners[*s], corners[*r]);
+                if dot(side, side) > edge.1 {
+                    edge = (number, dot(side, side));
+                }
                 let mut change = 0.0;
                 let mut count = 0;
                 for row in rows {
@@ -451,8 +462,11 @@ impl Cell<'_> {
                 }
                 let change = change / count as f64;
                 if change > best.2 {
-                    best = (index, edge, change);
+                    best = (index, 0, change);
                 }
+            }
+            if best.0 == index {
+                best.1 = edge.0;
             }
         }
         (best.0, best.1)
@@ -460,7 +474,7 @@ impl Cell<'_> {
 
     /// Both halves of a part.
     fn cut(&mut self, mut part: Part) -> [Part; 2] {
-        let (index, edge) = self.longest();
+        let (index, edge) = self.longest(&part);
         let factor = &self.factors[index];
         let (inner, points) = (factor.inner, factor.lattice.points);
         let ([r, s], rows) = &factor.lattice.edges[edge];
@@ -588,12 +602,13 @@ impl Kernel for Halves<'_> {
     }
 }
 
-/// Whether the symmetric parts of `rows J`, less `delta` on their diagonals, are all positive definite, and the least of
-/// their determinants.
+/// Whether the symmetric parts of `rows J`, or else of `J rows`, less `delta` on their diagonals, are all positive definite,
+/// and the least of their determinants.
 struct Test<'a> {
     control: &'a [f64],
     stride: usize,
     rows: &'a Columns<f64>,
+    from_left: bool,
     delta: f64,
     symmetric: &'a mut [f64],
     least: &'a mut f64,
@@ -617,14 +632,19 @@ impl Kernel for Test<'_> {
         let (delta, threshold, half) = (V::constant(self.delta), V::constant(1e-14), V::constant(0.5));
         let mut least = V::constant(f64::INFINITY);
         for place in (0..self.stride).step_by(WIDTH) {
-            let mut m = [[V::constant(0.0); 3]; 3];
+            let mut matrix = [[V::constant(0.0); 3]; 3];
             for column in 0..3 {
-                let mut values = [V::constant(0.0); 3];
                 for row in 0..3 {
-                    values[row] = load(&self.control[(3 * column + row) * self.stride + place..]);
+                    matrix[row][column] = load(&self.control[(3 * column + row) * self.stride + place..]);
                 }
-                for row in 0..3 {
-                    m[row][column] = rows[row][0] * values[0] + rows[row][1] * values[1] + rows[row][2] * values[2];
+            }
+            let [left, right] = if self.from_left { [rows, matrix] } else { [matrix, rows] };
+            let mut m = [[V::constant(0.0); 3]; 3];
+            for row in 0..3 {
+                for column in 0..3 {
+                    m[row][column] = left[row][0] * right[0][column]
+                        + left[row][1] * right[1][column]
+                        + left[row][2] * right[2][column];
                 }
             }
             let entries = [

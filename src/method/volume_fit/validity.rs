@@ -73,8 +73,8 @@ pub fn certify(space: &Space, references: &[Columns<f64>], x: &[f64], observer: 
     }
     if let Some(bound) = open {
         result.notices.push(format!(
-            "elements stay undecided after {MOST_PARTS} parts: no point of theirs with a determinant below 0 was found, and a \
-             proof only that it is at least {bound:.3e}"
+            "elements stay undecided after as many cuts as they may take: no point of theirs with a determinant below 0 was \
+             found, and a proof only that it is at least {bound:.3e}"
         ));
     }
     if let Some((cell, point, value)) = first {

@@ -606,6 +606,17 @@ fn a_filled_hole_joins_smoothly_and_frames_share_a_factorization() {
         (1, 15)
     );
     assert!((outcome.metrics["displacement_max"] - 0.5).abs() < 1e-9);
+    // The picture shows what is free, at its seam, and held; a single moved vertex has no triangle of its own.
+    let content = format::read("result.vtu", outcome.mesh.as_ref().expect("a mesh")).expect("a VTU file");
+    let parts = content
+        .cell_data
+        .iter()
+        .find(|field| field.name == "free_seam_held_moved");
+    let parts = &parts.expect("the field").values;
+    let count = |part: f64| parts.iter().filter(|&&found| found == part).count();
+    // 16 x 16 cells of two triangles, the outermost two layers held: the next layer of 12 x 12 is the seam.
+    assert_eq!(count(2.0), 2 * (16 * 16 - 12 * 12));
+    assert!(count(1.0) > 2 * (12 * 12 - 10 * 10) - 4 && count(0.0) > 0 && count(3.0) == 0);
 }
 
 #[test]

@@ -163,7 +163,9 @@ pub static FIELDS: &[Field] = &[
         kind: Kind::List(&Kind::Table(HANDLE)),
         default: Default::Absent,
         doc: "Which vertices are fixed, moved or free; a later handle wins. Vertices that no handle selects are free. \
-              Without handles a generated mesh brings its own, and a file is fixed at its boundary.",
+              Without handles a generated mesh brings its own, and a file is fixed at its boundary. To edit a surface set \
+              data = \"position\" and handles such as [{ select = \"boundary\", rings = 2 }, { select = \"nearest\", \
+              center = [0, 0, 0], role = \"moved\", translate = [0, 0, 0.5] }].",
     },
     Field {
         name: "tangents",

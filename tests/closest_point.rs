@@ -228,7 +228,10 @@ fn a_measurement_can_be_stopped_at_any_time() {
     let questions = asked.get();
     // Sampling and searching, both ways, and again and again within.
     let work = whole.forward.samples + whole.backward.samples;
-    assert!(questions >= 4 && u64::from(questions) >= work / 2_000_000, "{questions} for {work} samples");
+    assert!(
+        questions >= 4 && u64::from(questions) >= work / 2_000_000,
+        "{questions} for {work} samples"
+    );
     for last in 1..=questions {
         assert!(count(last).is_err(), "asked {last} times");
         assert_eq!(asked.get(), last, "goes on after it was told to stop");

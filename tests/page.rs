@@ -23,7 +23,7 @@ fn ten() -> Vec<Row> {
                 ("model".into(), json!("ball")),
                 ("energy".into(), json!(format!("energy {index}"))),
             ];
-            row.mesh = Some(sample::mesh(13, 0.15 * index as f64));
+            row.mesh = Some(sample::stored(&sample::mesh(13, 0.15 * index as f64)));
             row
         })
         .collect()
@@ -109,8 +109,8 @@ fn text_cannot_become_markup() {
         row.record.measurement.host = evil.into();
         row.axes[0].1 = json!(evil);
     }
-    rows[0].mesh = Some(sample::mesh(2, 0.1));
-    rows[1].mesh = Some(format!("no mesh {evil}").into_bytes());
+    rows[0].mesh = Some(sample::stored(&sample::mesh(2, 0.1)));
+    rows[1].mesh = Some(sample::stored(format!("no mesh {evil}").as_bytes()));
     let page = written(&experiment, &rows);
     assert_well_formed(&page);
     assert!(!page.contains("alert(1)</script>"));
@@ -131,7 +131,7 @@ fn the_same_records_give_the_same_bytes() {
             .collect::<Vec<_>>()
     };
     let mut rows = sample::rows();
-    rows[1].mesh = Some(sample::mesh(4, 0.4));
+    rows[1].mesh = Some(sample::stored(&sample::mesh(4, 0.4)));
     let (first, second) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
     let stored = tempfile::NamedTempFile::new().unwrap();
     rows[1].files = vec![("notes.txt".into(), stored.path().into())];
@@ -162,7 +162,7 @@ fn to_look_at() {
     let mut rows = sample::rows();
     for (index, row) in rows.iter_mut().enumerate() {
         if row.record.result.status == Status::Done {
-            row.mesh = Some(sample::mesh(13, 0.5 * index as f64));
+            row.mesh = Some(sample::stored(&sample::mesh(13, 0.5 * index as f64)));
         }
     }
     let (mut study, rate) = sample::study();

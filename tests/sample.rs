@@ -2,6 +2,7 @@
 
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
 use vargeo::experiment::file::{
     Axis, Bound, Comparison, Condition, Expectation, Experiment, Limits, Origin, Plot, Published, Rate, Table, Timing,
 };
@@ -343,6 +344,17 @@ pub fn study() -> (Vec<Row>, Rate) {
         }),
     };
     (rows, rate)
+}
+
+/// Bytes in a file of their own, as a store holds them.
+pub fn stored(bytes: &[u8]) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("stored");
+    std::fs::create_dir_all(&folder).expect("a folder");
+    let path = folder.join(vargeo::experiment::job::sha256(bytes));
+    let mut file = tempfile::NamedTempFile::new_in(&folder).expect("a file");
+    std::io::Write::write_all(&mut file, bytes).expect("room for it");
+    file.persist(&path).expect("a file");
+    path
 }
 
 /// A grid of six tetrahedra a cell mapped onto a bulging, twisted one, as a VTU file with the fields of a map.

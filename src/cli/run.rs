@@ -231,17 +231,13 @@ fn summary(plan: &Plan, finished: &[Finished]) -> String {
     format!("{}\n", parts.join(", "))
 }
 
-/// The records as the report wants them, with the result meshes from the store.
+/// The records as the report wants them, with the places of the result meshes in the store.
 pub(super) fn rows(plan: &Plan, store: &Store, finished: Vec<Finished>) -> Vec<Row> {
     let row = |finished: Finished| {
         let job = &plan.jobs[finished.index];
         let record = finished.record;
         let mesh = record.result.artifacts.contains_key(MESH);
-        let mesh = mesh.then(|| std::fs::read(store.entry(&record.key).join(MESH)));
-        let mesh = mesh.and_then(|read| {
-            read.map_err(|error| eprintln!("warning: {}: the result mesh cannot be read: {error}", job.name))
-                .ok()
-        });
+        let mesh = mesh.then(|| store.entry(&record.key).join(MESH));
         let further = record.result.artifacts.keys().filter(|name| *name != MESH);
         let files = further.map(|name| (name.clone(), store.entry(&record.key).join(name)));
         Row {

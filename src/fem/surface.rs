@@ -25,7 +25,8 @@ impl Pattern {
         self.offsets[vertex as usize]..self.offsets[vertex as usize + 1]
     }
 
-    fn place(&self, row: u32, column: u32) -> usize {
+    /// Where an entry stands in `columns` and in the values; where it would stand if the row has no such entry.
+    pub fn place(&self, row: u32, column: u32) -> usize {
         let range = self.row(row);
         range.start + self.columns[range].partition_point(|&other| other < column)
     }

@@ -80,12 +80,10 @@ pub fn write(experiment: &Experiment, rows: &[Row], planned: usize, folder: &Pat
     let fits = rate::fits(experiment, rows);
     publish("macros.tex", macros::write(experiment, rows, &fits).as_bytes())?;
     for row in rows {
-        if let Some(mesh) = &row.mesh {
-            publish(&format!("{}.vtu", row.name), mesh)?;
-        }
-        for (name, path) in &row.files {
+        let mesh = row.mesh.iter().map(|path| ("vtu", path));
+        for (ending, path) in mesh.chain(row.files.iter().map(|(name, path)| (name.as_str(), path))) {
             let bytes = std::fs::read(path).map_err(|error| ReportError::Read(path.clone(), error))?;
-            publish(&format!("{}.{name}", row.name), &bytes)?;
+            publish(&format!("{}.{ending}", row.name), &bytes)?;
         }
     }
     let verdicts = gate::judge(experiment, rows, &fits);

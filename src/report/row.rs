@@ -19,8 +19,8 @@ pub struct Row {
     pub record: Record,
     /// Whether the record was already stored; told on the terminal only, so that a second run writes the same bytes.
     pub cached: bool,
-    /// The result mesh as bytes of a VTU file.
-    pub mesh: Option<Vec<u8>>,
+    /// Where the result mesh is, a VTU file.
+    pub mesh: Option<PathBuf>,
     /// Where the result's further files are, by what follows the job's name in theirs.
     pub files: Vec<(String, PathBuf)>,
 }

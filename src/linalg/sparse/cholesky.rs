@@ -94,8 +94,11 @@ impl<const B: usize> BlockCholesky<B> {
         self.factorized = false;
         self.factorizations += 1;
         let elimination = &self.pattern.elimination;
-        self.factor.resize(elimination.factor_scalars(), 0.0);
-        self.arena.resize(elimination.working_scalars(), 0.0);
+        if self.factor.is_empty() {
+            // Fresh zeros come from the system without a pass over them, which a resize would make.
+            self.factor = vec![0.0; elimination.factor_scalars()];
+            self.arena = vec![0.0; elimination.working_scalars()];
+        }
         let numeric = Numeric {
             pattern: &self.pattern,
             elimination,

@@ -18,7 +18,7 @@ use crate::method::Failure;
 const ROUNDING: f64 = 4.0 * f64::EPSILON;
 /// Refinement ends when the backward error is down to rounding or does not halve, and after this many steps at the
 /// latest.
-const REFINEMENTS: usize = 4;
+const REFINEMENTS: usize = 8;
 
 /// A symmetric matrix with a factor that solves for it.
 pub(super) trait Factorized {

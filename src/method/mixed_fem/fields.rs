@@ -59,22 +59,24 @@ pub static FIELDS: &[Field] = &[
         name: "relaxation",
         kind: Kind::Choice(&[
             (
-                "linear",
-                "c h s / 80 D with the side s of a square of the domain's area: keeps its rate on finer meshes",
+                "tangential",
+                "c h^3 s^2 / 100 K with the stiffness K of the boundary curves, mixed systems only: keeps its rate on every mesh",
             ),
             (
-                "quadratic",
-                "c h^2 D: a little more accurate on coarse meshes; on irregular ones the error levels off",
+                "linear",
+                "c h s / 80 D: a little more accurate on coarse meshes; falls below second order on very fine irregular ones",
             ),
+            ("quadratic", "c h^2 D: levels off earlier on irregular meshes"),
         ]),
-        default: Default::Text("linear"),
-        doc: "How much the boundary rows of the stabilised system give way: h is the mean edge length, D the lumped mass.",
+        default: Default::Text("tangential"),
+        doc: "How much the boundary rows of the stabilised system give way: h is the mean edge length, s the side of a square \
+              of the domain's area, D the lumped mass.",
     },
     Field {
         name: "stabilisation",
         kind: Kind::Number { min: 1e-12, max: 1e12 },
         default: Default::Number(1.0),
-        doc: "Factor c of the relaxation; 1 to 3 is its plateau.",
+        doc: "Factor c of the relaxation.",
     },
     Field {
         name: "mass",
@@ -95,7 +97,8 @@ pub static FIELDS: &[Field] = &[
             ("auto", "one-field with solver = \"cholesky\", otherwise mixed"),
             (
                 "one-field",
-                "the other fields are eliminated: positive definite, fewer unknowns, less sparse; lumped masses only",
+                "the other fields are eliminated: positive definite, fewer unknowns, less sparse; lumped masses only, not \
+                 for relaxation = \"tangential\"",
             ),
             ("mixed", "all fields at once: symmetric and indefinite"),
         ]),
@@ -160,7 +163,9 @@ pub static FIELDS: &[Field] = &[
         kind: Kind::List(&Kind::Table(HANDLE)),
         default: Default::Absent,
         doc: "Which vertices are fixed, moved or free; a later handle wins. Vertices that no handle selects are free. \
-              Without handles a generated mesh brings its own, and a file is fixed at its boundary.",
+              Without handles a generated mesh brings its own, and a file is fixed at its boundary. To edit a surface set \
+              data = \"position\" and handles such as [{ select = \"boundary\", rings = 2 }, { select = \"nearest\", \
+              center = [0, 0, 0], role = \"moved\", translate = [0, 0, 0.5] }].",
     },
     Field {
         name: "tangents",

@@ -229,8 +229,8 @@ pub(super) fn coefficients(
             visit(u, other, w, laplacian);
             visit(w, other, v, -mass);
             visit(w, other, u, laplacian);
-            if diagonal {
-                visit(w, other, w, discretization.penalty[other]);
+            if let Some(&relaxed) = discretization.penalty.get(place) {
+                visit(w, other, w, relaxed);
             }
         }
     }

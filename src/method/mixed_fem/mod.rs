@@ -50,7 +50,7 @@ impl Method for MixedFem {
     }
 
     fn version(&self) -> u32 {
-        3
+        4
     }
 
     fn summary(&self) -> &'static str {

@@ -1,7 +1,8 @@
 //! The system in `u` alone, after elimination of the other fields: symmetric and positive definite for lumped masses.
 //!
 //! Order 2: `B^T D^-1 B u = ...` with `B = L` from the unknown `u` to the unknown `v` (system 11). Order 3:
-//! `(P^T (-L) P + C^T S^-1 C) u = ...` with `P = D^-1 B` and `C = L` from the unknown `u` to the relaxed boundary rows.
+//! `(P^T (-L) P + C^T S^-1 C) u = ...` with `P = D^-1 B` and `C = L` from the unknown `u` to the relaxed boundary rows,
+//! where `S` is diagonal.
 
 use super::scheme::Discretization;
 use crate::linalg::sparse::{BlockPattern, FIXED, Graph, geometric_dissection};
@@ -85,6 +86,7 @@ impl OneField {
         let pattern = &discretization.operators.pattern;
         let laplacian = &discretization.operators.laplacian;
         let lumped = discretization.lumped();
+        let penalty = discretization.penalty_diagonal();
         let [u, v, _] = &discretization.unknown;
         let vertices = domain.places.len();
         let mut name = vec![FIXED; vertices];
@@ -136,8 +138,8 @@ impl OneField {
                         }
                     }
                 }
-                if discretization.penalty[other] > 0.0 {
-                    let factor = laplacian[place] / discretization.penalty[other];
+                if penalty[other] > 0.0 {
+                    let factor = laplacian[place] / penalty[other];
                     for inner in pattern.row(other as u32) {
                         let column = name[pattern.columns[inner] as usize];
                         if column != FIXED && column as usize >= row {
@@ -195,12 +197,13 @@ pub fn right_side(discretization: &Discretization<'_>) -> Vec<f64> {
     } else {
         let second = discretization.multiply_laplacian(&laplacian);
         let mut bilaplacian = discretization.known[2].clone();
+        let penalty = discretization.penalty_diagonal();
         for vertex in (0..vertices).filter(|&vertex| w[vertex]) {
             for c in 0..components {
                 let at = vertex * components + c;
-                bilaplacian[at] = if discretization.penalty[vertex] > 0.0 {
+                bilaplacian[at] = if penalty[vertex] > 0.0 {
                     let rest = lumped[vertex] * laplacian[at] - image[at] - discretization.flux[at];
-                    rest / discretization.penalty[vertex]
+                    rest / penalty[vertex]
                 } else {
                     second[at] / lumped[vertex]
                 };

@@ -189,7 +189,9 @@ impl Settings {
 
     /// Whether a one-field system exists.
     pub fn has_one_field(&self) -> bool {
-        self.mass != Mass::Full && self.scheme() != Scheme::Unstabilised
+        let scheme = self.scheme();
+        let coupled = scheme == Scheme::Stabilised && self.relaxation == Relaxation::Tangential;
+        self.mass != Mass::Full && scheme != Scheme::Unstabilised && !coupled
     }
 
     /// Whether the one-field system is factorized.
@@ -248,6 +250,10 @@ impl Settings {
     }
 }
 
+/// What a one-field system needs.
+pub(super) const ONE_FIELD: &str = "a lumped mass and, with curve conditions on the triharmonic equation, any curve but \
+                                    \"unstabilised\" and any relaxation but \"tangential\"";
+
 /// Checks that go across fields: path of the offending field and message.
 pub fn check(settings: &Value) -> Vec<(String, String)> {
     let settings = match Settings::resolve(settings) {
@@ -265,7 +271,7 @@ pub fn check(settings: &Value) -> Vec<(String, String)> {
     if settings.system == System::OneField && !settings.has_one_field() {
         error(
             "system",
-            "the one-field system needs a lumped mass and a system that is not singular; use system = \"mixed\"".into(),
+            format!("the one-field system needs {ONE_FIELD}; use system = \"mixed\""),
         );
     }
     let one_field = settings.one_field();
@@ -278,7 +284,12 @@ pub fn check(settings: &Value) -> Vec<(String, String)> {
     if !one_field && settings.solver == Solver::Cholesky {
         error(
             "solver",
-            "the mixed system is indefinite: use \"ldlt\", \"lblt\" or \"lu\", or system = \"one-field\"".into(),
+            if settings.has_one_field() {
+                "the mixed system is indefinite: use \"ldlt\", \"lblt\" or \"lu\", or system = \"one-field\""
+                    .to_string()
+            } else {
+                format!("it is for the one-field system, which needs {ONE_FIELD}; use \"ldlt\", \"lblt\" or \"lu\"")
+            },
         );
     }
     for (index, handle) in settings.handles.iter().flatten().enumerate() {

@@ -7,7 +7,7 @@ use super::metrics;
 use super::model::Model;
 use super::planar_data::{self, Derivatives};
 use super::scheme::{Data, Discretization, Scheme};
-use super::settings::{Condition, DataKind, Fill, Settings, Solver};
+use super::settings::{Condition, DataKind, Fill, ONE_FIELD, Settings, Solver};
 use super::singular;
 use super::surface_study;
 use super::system::{System, mixed_nullity};
@@ -251,7 +251,9 @@ pub(super) fn compare(
     report: &mut Report,
     observer: &mut dyn Observer,
 ) -> Result<(), Failure> {
-    if settings.compare && settings.has_one_field() {
+    if settings.compare && !settings.has_one_field() {
+        report.note(format!("no comparison: the one-field system needs {ONE_FIELD}"));
+    } else if settings.compare {
         observer.phase("compare");
         let solved = System::new(
             discretization,

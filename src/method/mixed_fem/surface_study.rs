@@ -126,7 +126,9 @@ pub(super) fn run(mut model: Model, settings: &Settings, observer: &mut dyn Obse
         });
     }
     observer.phase("measure");
-    measure(&domain, &sides, settings, &prescribed, &places, rest, report)
+    // Beyond a curve is what it prescribes, beyond a region the surface itself.
+    let beyond = (scheme != Scheme::Region).then_some(&prescribed);
+    measure(&domain, &sides, beyond, &roles, &places, rest, report)
 }
 
 /// What the generator, the patch, the handles, or the mesh's boundary say.
@@ -160,23 +162,22 @@ fn roles(model: &Model, settings: &Settings) -> Result<Roles, Failure> {
 fn measure(
     domain: &Domain<'_>,
     sides: &Sides<'_>,
-    settings: &Settings,
-    prescribed: &Prescribed,
+    beyond: Option<&Prescribed>,
+    roles: &Roles,
     places: &[[f64; 3]],
     rest: &[[f64; 3]],
     mut report: Report,
 ) -> Result<Outcome, Failure> {
     let mesh = domain.mesh;
-    let region = settings.scheme() == Scheme::Region;
     let found = jumps(sides, places, |vertex, across| {
-        if region {
+        let Some(prescribed) = beyond else {
             let fit = sides.fit(places, vertex, false)?;
             return Some((fit.normal, fit.curvature(across)));
-        }
+        };
         prescribed.beyond[vertex as usize]
     });
     let size = diagonal(places);
-    if region {
+    if beyond.is_none() {
         let before = jumps(sides, rest, |vertex, across| {
             let fit = sides.fit(rest, vertex, false)?;
             Some((fit.normal, fit.curvature(across)))
@@ -191,11 +192,7 @@ fn measure(
     }
     let moves: Vec<f64> = places.iter().zip(rest).map(|(a, b)| length(subtract(*a, *b))).collect();
     report.set("displacement_max", moves.iter().copied().fold(0.0, f64::max));
-    let triangles: Vec<f64> = domain
-        .inside
-        .iter()
-        .map(|&inside| f64::from(u8::from(inside)))
-        .collect();
+    let parts = parts(mesh, roles);
     let over: Vec<f64> = mesh
         .cells
         .iter()
@@ -216,11 +213,26 @@ fn measure(
         ],
         &[
             ("isophotes", 1, &lines),
-            ("domain", 1, &triangles),
+            ("free_seam_held_moved", 1, &parts),
             ("displacement", 1, &over),
         ],
     );
     Ok(report.outcome(picture))
+}
+
+/// What a triangle belongs to: 0 the free part, 1 the seam between it and the rest, 2 what is held, 3 what is moved.
+fn parts(mesh: &TriangleMesh, roles: &Roles) -> Vec<f64> {
+    let part = |cell: &[u32; 3]| {
+        let free = cell.iter().filter(|&&vertex| roles.free[vertex as usize]).count();
+        let moved = |&vertex: &u32| roles.motion[vertex as usize] != [0.0; 3];
+        match free {
+            3 => 0.0,
+            1 | 2 => 1.0,
+            _ if cell.iter().any(moved) => 3.0,
+            _ => 2.0,
+        }
+    };
+    mesh.cells.iter().map(part).collect()
 }
 
 /// Means of the triangles' normals, weighted by area.

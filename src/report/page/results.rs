@@ -11,6 +11,7 @@ use crate::report::picture::solid::Solid;
 use crate::report::picture::{EYE, poster};
 use crate::report::row::{Quantity, Row, label};
 use base64::Engine;
+use rayon::prelude::*;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -29,56 +30,67 @@ pub struct Results {
 /// A job's mesh as read, or why it cannot be shown.
 type Loaded = Option<Result<Solid, String>>;
 
+/// Values of a field that one result adds to those by which its scale is chosen, besides its least and largest one.
+const SAMPLES: usize = 20_000;
+/// Results are read twice, once for the scales and once to be drawn, but for those within the first so many bytes of
+/// files.
+const KEPT_BYTES: u64 = 16 << 20;
+/// Results in memory at a time.
+const SIDE_BY_SIDE: usize = 4;
+
 pub fn results(experiment: &Experiment, rows: &[Row]) -> Result<Results, ReportError> {
-    let solids: Vec<Loaded> = rows.iter().map(load).collect();
-    let scales = scales(&solids);
-    let values = solids
-        .iter()
-        .flatten()
-        .flatten()
-        .map(|solid| solid.count() * solid.fields.len())
-        .sum();
+    let (survey, mut kept) = survey(rows);
+    let scales = survey.scales();
     let mut embedded = Embedded {
-        levels: mesh::levels(values),
+        levels: mesh::levels(survey.values),
         ..Embedded::default()
     };
     let mut cards = String::new();
     let mut left_out = Vec::new();
-    let mut shown_field = None;
-    for (row, solid) in rows.iter().zip(&solids) {
-        let picture = match solid {
-            Some(Ok(solid)) => {
-                let field = (!solid.fields.is_empty()).then_some(0);
-                let name = field.map(|field| solid.fields[field].name.as_str());
-                let scale = name.map_or(UNIT, |name| scales[name]);
-                if shown_field.is_none() {
-                    shown_field = name;
+    let mut shown_field: Option<String> = None;
+    // A few at a time are in memory and are drawn side by side.
+    for start in (0..rows.len()).step_by(SIDE_BY_SIDE) {
+        let part = start..rows.len().min(start + SIDE_BY_SIDE);
+        let drawn: Vec<(Loaded, Option<Result<Vec<u8>, String>>)> = kept[part.clone()]
+            .par_iter_mut()
+            .zip(&rows[part.clone()])
+            .map(|(kept, row)| {
+                let solid = kept.take().unwrap_or_else(|| load(row));
+                let png = solid.as_ref().and_then(|solid| solid.as_ref().ok()).map(|solid| {
+                    let first = solid.fields.first();
+                    let scale = first.map_or(UNIT, |field| scales[&field.name]);
+                    poster(solid, first.map(|_| 0), scale)
+                });
+                (solid, png)
+            })
+            .collect();
+        for (row, (solid, png)) in rows[part].iter().zip(drawn) {
+            let picture = match (solid, png) {
+                (Some(Ok(solid)), Some(png)) => {
+                    let png = png.map_err(|error| ReportError::Picture(row.name.clone(), error))?;
+                    let name = solid.fields.first().map(|field| field.name.clone());
+                    let index = embedded.add(row, &solid, &scales);
+                    if index.is_none() {
+                        left_out.push(row.name.as_str());
+                    }
+                    let html = picture(row, &solid, name.as_deref(), &png, index);
+                    shown_field = shown_field.or(name);
+                    html
                 }
-                let png = poster(solid, field, scale).map_err(|error| ReportError::Picture(row.name.clone(), error))?;
-                let index = embedded.add(row, solid, &scales);
-                if index.is_none() {
-                    left_out.push(row.name.as_str());
-                }
-                picture(row, solid, name, &png, index)
-            }
-            Some(Err(error)) => format!(
-                "<p class=\"none\">The result mesh cannot be shown: {}</p>",
-                escape(error)
-            ),
-            // The table of jobs holds those that ended well and left no mesh.
-            None if row.done() => continue,
-            None => String::new(),
-        };
-        cards.push_str(&card(experiment, row, &picture));
+                (Some(Err(error)), _) => format!(
+                    "<p class=\"none\">The result mesh cannot be shown: {}</p>",
+                    escape(&error)
+                ),
+                // The table of jobs holds those that ended well and left no mesh.
+                _ if row.done() => continue,
+                _ => String::new(),
+            };
+            cards.push_str(&card(experiment, row, &picture));
+        }
     }
     let mut text = String::new();
     if let Some(name) = shown_field {
-        let scale = scales[name];
-        let inverted = solids
-            .iter()
-            .flatten()
-            .flatten()
-            .any(|solid| solid.inverted.contains(&true));
+        let scale = scales[&name];
         let _ = write!(
             text,
             "<div class=\"scale\"><span>{}{}</span><span>{}</span><span class=\"ramp\" style=\"background:linear-gradient(90deg,{})\"></span><span>{}</span>{}</div>",
@@ -88,7 +100,7 @@ pub fn results(experiment: &Experiment, rows: &[Row]) -> Result<Results, ReportE
             MAP.map(|[red, green, blue]| format!("#{red:02x}{green:02x}{blue:02x}"))
                 .join(","),
             round(scale.high, 3).unicode(),
-            if inverted {
+            if survey.inverted {
                 "<span class=\"striped\"></span><span>inverted cells</span>"
             } else {
                 ""
@@ -118,8 +130,12 @@ const UNIT: Scale = Scale {
 };
 
 fn load(row: &Row) -> Loaded {
-    let bytes = row.mesh.as_ref()?;
-    let content = match crate::mesh::format::read(&format!("{}.vtu", row.name), bytes) {
+    let path = row.mesh.as_ref()?;
+    let bytes = match std::fs::read(path) {
+        Ok(bytes) => bytes,
+        Err(error) => return Some(Err(format!("cannot read {}: {error}", path.display()))),
+    };
+    let content = match crate::mesh::format::read(&format!("{}.vtu", row.name), &bytes) {
         Ok(content) => content,
         Err(error) => return Some(Err(error.to_string())),
     };
@@ -131,18 +147,69 @@ fn load(row: &Row) -> Loaded {
     }
 }
 
-/// One scale for each field over all jobs, so that their colours compare.
-fn scales(solids: &[Loaded]) -> BTreeMap<String, Scale> {
-    let mut values: BTreeMap<String, Vec<f64>> = BTreeMap::new();
-    for solid in solids.iter().flatten().flatten() {
+/// What the page needs to know of all results before it draws one.
+#[derive(Default)]
+struct Survey {
+    /// Values of each field, as many as its scale needs.
+    samples: BTreeMap<String, Vec<f64>>,
+    /// Number of all values.
+    values: usize,
+    /// Whether a cell is inverted.
+    inverted: bool,
+}
+
+impl Survey {
+    fn add(&mut self, solid: &Solid) {
         for field in &solid.fields {
-            values.entry(field.name.clone()).or_default().extend(&field.values);
+            let values = &field.values;
+            let samples = self.samples.entry(field.name.clone()).or_default();
+            let step = values.len().div_ceil(SAMPLES).max(1);
+            samples.extend(values.iter().step_by(step));
+            if step > 1 {
+                let finite = values.iter().copied().filter(|value| value.is_finite());
+                samples.extend(finite.clone().min_by(f64::total_cmp));
+                samples.extend(finite.max_by(f64::total_cmp));
+            }
         }
+        self.values += solid.count() * solid.fields.len();
+        self.inverted |= solid.inverted.contains(&true);
     }
-    values
-        .into_iter()
-        .map(|(name, values)| (name, Scale::of(values.into_iter())))
-        .collect()
+
+    fn join(mut self, other: Survey) -> Survey {
+        for (name, samples) in other.samples {
+            self.samples.entry(name).or_default().extend(samples);
+        }
+        self.values += other.values;
+        self.inverted |= other.inverted;
+        self
+    }
+
+    /// One scale for each field over all jobs, so that their colours compare.
+    fn scales(&self) -> BTreeMap<String, Scale> {
+        let scale = |(name, values): (&String, &Vec<f64>)| (name.clone(), Scale::of(values.iter().copied()));
+        self.samples.iter().map(scale).collect()
+    }
+}
+
+/// Reads every result once; the first ones stay in memory.
+fn survey(rows: &[Row]) -> (Survey, Vec<Option<Loaded>>) {
+    let mut bytes = 0;
+    let keep = rows.iter().map(|row| {
+        let length = row.mesh.as_ref().and_then(|path| std::fs::metadata(path).ok());
+        bytes += length.map_or(0, |found| found.len());
+        bytes <= KEPT_BYTES
+    });
+    let keep: Vec<bool> = keep.collect();
+    let read = rows.par_iter().zip(keep).with_max_len(1).map(|(row, keep)| {
+        let solid = load(row);
+        let mut survey = Survey::default();
+        if let Some(Ok(solid)) = &solid {
+            survey.add(solid);
+        }
+        (survey, keep.then_some(solid))
+    });
+    let (surveys, kept): (Vec<Survey>, Vec<Option<Loaded>>) = read.unzip();
+    (surveys.into_iter().fold(Survey::default(), Survey::join), kept)
 }
 
 fn picture(row: &Row, solid: &Solid, field: Option<&str>, png: &[u8], index: Option<usize>) -> String {
@@ -250,17 +317,17 @@ fn card(experiment: &Experiment, row: &Row, picture: &str) -> String {
 
 /// Meshes and results for the viewer.
 #[derive(Default)]
-struct Embedded<'a> {
-    meshes: Vec<(&'a Solid, Order)>,
+struct Embedded {
+    meshes: Vec<(Solid, Order)>,
     mesh_facts: Vec<Value>,
     job_facts: Vec<Value>,
     scripts: String,
     levels: u8,
 }
 
-impl<'a> Embedded<'a> {
+impl Embedded {
     /// Embeds a result and returns its number; nothing where it does not fit.
-    fn add(&mut self, row: &Row, solid: &'a Solid, scales: &BTreeMap<String, Scale>) -> Option<usize> {
+    fn add(&mut self, row: &Row, solid: &Solid, scales: &BTreeMap<String, Scale>) -> Option<usize> {
         if solid.count() > MOST_CELLS || self.scripts.len() > MOST_BYTES {
             return None;
         }
@@ -283,7 +350,7 @@ impl<'a> Embedded<'a> {
                     "<script type=\"text/plain\" id=\"mesh-{number}\">{}</script>",
                     packed.base64
                 );
-                self.meshes.push((solid, order));
+                self.meshes.push((solid.clone(), order));
                 number
             }
         };

@@ -54,6 +54,68 @@ fn the_report_of_another_file_is_not_overwritten_in_silence() {
 }
 
 #[test]
+fn a_folder_of_experiments_is_one_command() {
+    let folder = folder();
+    let place = |name: &str| folder.path().join(name);
+    let one = SMALL.replace(
+        "energy = [\"stretch\", \"symmetric-dirichlet\"]",
+        "energy = [\"stretch\"]",
+    );
+    let unmet = format!("{one}\n[[expect]]\ninverted = {{ min = 1 }}\n");
+    std::fs::create_dir_all(place("study/more")).unwrap();
+    std::fs::write(place("study/first.toml"), &one).unwrap();
+    std::fs::write(place("study/more/second.toml"), &unmet).unwrap();
+    std::fs::write(place("study/published.toml"), "[table]\nrows = []\n").unwrap();
+    let run = |arguments: &[&str]| {
+        let Output { status, stdout, stderr } = vargeo(folder.path(), arguments).output().unwrap();
+        let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
+        (status.code(), text(stdout), text(stderr))
+    };
+    let (code, output, errors) = run(&["check", "study", "--junit", "verdicts.xml"]);
+    assert_eq!(code, Some(1), "{output}{errors}");
+    assert!(errors.contains("first: 0 expectations met") && errors.contains("second: 0 expectations met, 1 failed"));
+    assert!(output.contains("\u{2713} first   1 of 1 jobs"), "{output}");
+    assert!(
+        output.contains("\u{2717} second  1 of 1 jobs, 0 of 1 expectations met"),
+        "{output}"
+    );
+    let overview = std::fs::read_to_string(place("results/index.html")).unwrap();
+    assert!(overview.contains("href=\"first/index.html\"") && overview.contains("href=\"second/index.html\""));
+    let verdicts = std::fs::read_to_string(place("verdicts.xml")).unwrap();
+    assert!(
+        verdicts.contains("first: jobs") && verdicts.contains("second: expectations"),
+        "{verdicts}"
+    );
+
+    // Both files share the stored result, and each can be reported and planned together.
+    let (code, output, _) = run(&["plan", "study"]);
+    assert!(
+        code == Some(0) && output.matches("0 to run, 1 stored").count() == 2,
+        "{output}"
+    );
+    assert_eq!(run(&["report", "study", "-q"]).0, Some(0));
+    assert_eq!(run(&["run", "study", "-q"]).0, Some(0));
+
+    // What is wrong with one file or between two is told before anything runs.
+    std::fs::write(place("study/more/first.toml"), one.replace("stretch", "arap")).unwrap();
+    let (code, _, errors) = run(&["run", "study", "--results", "new"]);
+    assert!(
+        code == Some(3) && errors.contains("would write their reports to one folder, \"first\""),
+        "{errors}"
+    );
+    std::fs::write(place("study/more/first.toml"), one.replace("stretch", "strech")).unwrap();
+    let (code, _, errors) = run(&["run", "study", "--results", "new"]);
+    assert!(code == Some(3) && errors.contains("strech"), "{errors}");
+    assert!(!place("new").exists());
+    std::fs::create_dir(place("none")).unwrap();
+    let (code, _, errors) = run(&["run", "none"]);
+    assert!(
+        code == Some(3) && errors.contains("no experiment file in this folder"),
+        "{errors}"
+    );
+}
+
+#[test]
 fn a_second_run_comes_from_the_store() {
     let folder = folder();
     let (code, output, errors) = experiment(folder.path(), SMALL, &["run", "small.toml"]);

@@ -176,7 +176,9 @@ fn junit_names_what_failed() {
     let experiment = sample::experiment();
     let rows = sample::rows();
     let verdicts = gate::judge(&experiment, &rows, &[]);
-    let xml = junit::write(&experiment.name, &rows, &verdicts).unwrap();
+    let mut document = junit::Document::new(&experiment.name);
+    document.add(&experiment.name, &rows, &verdicts);
+    let xml = document.write().unwrap();
     assert!(xml.contains("tests=\"7\"") && xml.contains("errors=\"1\""), "{xml}");
     assert!(xml.contains("time-limit: stopped after 600 s"));
     assert!(xml.contains("classname=\"sample line 12\""));

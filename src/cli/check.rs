@@ -2,13 +2,15 @@
 
 use super::Exit;
 use super::input::Input;
-use super::run::{self, Running};
+use super::run::{self, Done, Running};
+use crate::experiment::plan::Plan;
+use crate::report::Written;
 use crate::report::gate::{Outcome, Verdict};
 use crate::report::table::terminal::plain;
 use crate::report::{junit, publish};
 use std::path::{Path, PathBuf};
 
-/// Runs an experiment and holds its results against every `expect` of the file.
+/// Runs experiments and holds their results against every `expect` of the files.
 ///
 /// Ends with 1 when an expectation is not met, with 2 when all are met but a job failed that no expectation allows.
 #[derive(clap::Args)]
@@ -24,22 +26,31 @@ pub struct Arguments {
 
 /// Runs, reports, judges.
 pub fn execute(arguments: Arguments) -> Exit {
-    let done = arguments.input.plan().and_then(|plan| {
-        let done = run::run(&plan, &arguments.running)?;
-        Ok((plan, done))
-    });
-    let (plan, done) = match done {
-        Ok(done) => done,
+    let plans = match arguments.input.plans() {
+        Ok(plans) => plans,
         Err(exit) => return exit,
     };
-    let Some(written) = &done.written else { return done.exit };
-    let experiment = &plan.experiment;
-    if let Some(path) = &arguments.junit
-        && let Err(error) = write_junit(path, &experiment.name, &done.rows, &written.verdicts)
+    let mut document = junit::Document::new(match &plans[..] {
+        [plan] => &plan.experiment.name,
+        _ => "vargeo",
+    });
+    let exit = run::each(&plans, &arguments.running, |plan, done, written| {
+        document.add(&plan.experiment.name, &done.rows, &written.verdicts);
+        judge(plan, done, written)
+    });
+    if exit != Exit::Interrupted
+        && let Some(path) = &arguments.junit
+        && let Err(error) = write_junit(path, &document)
     {
         eprintln!("error: {error}");
         return Exit::FileWrong;
     }
+    exit
+}
+
+/// Prints what is not met.
+fn judge(plan: &Plan, done: &Done, written: &Written) -> Exit {
+    let experiment = &plan.experiment;
     let failed: Vec<&Verdict> = written
         .verdicts
         .iter()
@@ -69,7 +80,8 @@ pub fn execute(arguments: Arguments) -> Exit {
     };
     let met = count(Outcome::Met);
     eprintln!(
-        "{met} {} met, {} failed, {} skipped",
+        "{}: {met} {} met, {} failed, {} skipped",
+        experiment.name,
         if met == 1 { "expectation" } else { "expectations" },
         failed.len(),
         count(Outcome::Skipped)
@@ -81,8 +93,10 @@ pub fn execute(arguments: Arguments) -> Exit {
     }
 }
 
-fn write_junit(path: &Path, name: &str, rows: &[crate::report::Row], verdicts: &[Verdict]) -> Result<(), String> {
-    let xml = junit::write(name, rows, verdicts).map_err(|error| format!("cannot compose JUnit: {error}"))?;
+fn write_junit(path: &Path, document: &junit::Document) -> Result<(), String> {
+    let xml = document
+        .write()
+        .map_err(|error| format!("cannot compose JUnit: {error}"))?;
     let folder = match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
         _ => Path::new("."),

@@ -1,4 +1,4 @@
-//! What every command on an experiment file shares: the file, the folders of models, and how diagnostics are shown.
+//! What every command on experiment files shares: the files, the folders of models, and how diagnostics are shown.
 
 use super::Exit;
 use crate::experiment::diagnostic::{Diagnostic, Severity, render};
@@ -6,13 +6,15 @@ use crate::experiment::file::Experiment;
 use crate::experiment::plan::{Lookup, Plan};
 use crate::method;
 use std::io::IsTerminal;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-/// An experiment file and where its models are.
+/// Experiment files and where their models are.
 #[derive(clap::Args)]
 pub struct Input {
-    /// The experiment file.
-    pub file: PathBuf,
+    /// Experiment files. A folder stands for those in it and in the folders below, which are the TOML files with a
+    /// `method`.
+    #[arg(required = true, value_name = "FILE")]
+    pub files: Vec<PathBuf>,
     /// A folder where model files are looked for after the experiment's own; may be given several times. The variable
     /// VARGEO_MODELS holds more, separated as in PATH.
     #[arg(long, value_name = "DIR")]
@@ -20,12 +22,59 @@ pub struct Input {
 }
 
 impl Input {
-    /// Reads the file and unfolds its plan. What is wrong or doubtful is printed on standard error; the plan's notices
-    /// are left to the caller.
-    pub fn plan(&self) -> Result<Plan, Exit> {
-        let experiment = Experiment::read(&self.file, method::methods()).map_err(|diagnostics| fail(&diagnostics))?;
-        show(&experiment.origin.warnings);
-        Plan::new(experiment, &self.lookup()?).map_err(|diagnostics| fail(&diagnostics))
+    /// Reads the files and unfolds their plans. What is wrong or doubtful is printed on standard error, for all files;
+    /// the plans' notices are left to the caller.
+    pub fn plans(&self) -> Result<Vec<Plan>, Exit> {
+        let lookup = self.lookup()?;
+        let mut plans: Vec<(PathBuf, Plan)> = Vec::new();
+        let mut wrong = Vec::new();
+        for file in self.experiments()? {
+            let plan = Experiment::read(&file, method::methods()).and_then(|experiment| {
+                show(&experiment.origin.warnings);
+                Plan::new(experiment, &lookup)
+            });
+            match plan {
+                Ok(plan) => plans.push((file, plan)),
+                Err(diagnostics) => wrong.extend(diagnostics),
+            }
+        }
+        for (index, (file, plan)) in plans.iter().enumerate() {
+            let same = |other: &&(PathBuf, Plan)| other.1.experiment.name == plan.experiment.name;
+            if let Some((other, _)) = plans[..index].iter().find(same) {
+                let message = format!(
+                    "{} and {} would write their reports to one folder, \"{}\"",
+                    other.display(),
+                    file.display(),
+                    plan.experiment.name
+                );
+                wrong.push(Diagnostic::error(message).help("rename one of the files, or run them one after another"));
+            }
+        }
+        if wrong.is_empty() {
+            Ok(plans.into_iter().map(|(_, plan)| plan).collect())
+        } else {
+            Err(fail(&wrong))
+        }
+    }
+
+    /// The files named, folders replaced by what is in them.
+    fn experiments(&self) -> Result<Vec<PathBuf>, Exit> {
+        let mut files = Vec::new();
+        for path in &self.files {
+            if !path.is_dir() {
+                files.push(path.clone());
+                continue;
+            }
+            let before = files.len();
+            let read = find(path, &mut files);
+            read.map_err(|error| fail(&[Diagnostic::error(format!("cannot list {}: {error}", path.display()))]))?;
+            if files.len() == before {
+                let message = format!("{}: no experiment file in this folder", path.display());
+                let help = "an experiment file ends in .toml and has a method; `vargeo new METHOD` writes one";
+                return Err(fail(&[Diagnostic::error(message).help(help)]));
+            }
+        }
+        Ok(files)
     }
 
     fn lookup(&self) -> Result<Lookup, Exit> {
@@ -39,6 +88,25 @@ impl Input {
         }
         Ok(Lookup { folders })
     }
+}
+
+/// Adds the experiment files of a folder and of those below, by name. Links to folders are not followed.
+fn find(folder: &Path, files: &mut Vec<PathBuf>) -> std::io::Result<()> {
+    let mut entries = std::fs::read_dir(folder)?.collect::<Result<Vec<_>, _>>()?;
+    entries.sort_by_key(std::fs::DirEntry::file_name);
+    for entry in entries {
+        let path = entry.path();
+        if entry.file_type()?.is_dir() {
+            find(&path, files)?;
+        } else if path.extension().is_some_and(|ending| ending == "toml") {
+            // A file that is no TOML is reported when it is read as an experiment.
+            let text = std::fs::read_to_string(&path).unwrap_or_default();
+            if toml::from_str::<toml::Table>(&text).map_or(true, |table| table.contains_key("method")) {
+                files.push(path);
+            }
+        }
+    }
+    Ok(())
 }
 
 /// Prints diagnostics on standard error, in colour on a terminal.

@@ -1,4 +1,4 @@
-//! `vargeo plan`: the jobs of an experiment, which of them are stored, and which cannot run.
+//! `vargeo plan`: the jobs of experiments, which of them are stored, and which cannot run.
 
 use super::Exit;
 use super::input::Input;
@@ -22,19 +22,27 @@ pub struct Arguments {
 
 /// Prints the plan.
 pub fn execute(arguments: Arguments) -> Exit {
-    let plan = match arguments.input.plan() {
-        Ok(plan) => plan,
+    let plans = match arguments.input.plans() {
+        Ok(plans) => plans,
         Err(exit) => return exit,
     };
     let store = Store::new(arguments.results.join("store"));
-    let effort = effort(&plan, None);
-    let states: Vec<State> = plan
-        .jobs
+    for plan in &plans {
+        // A reader who has gone away is no error.
+        let _ = io::stdout().write_all(describe(plan, &states(plan, &store)).as_bytes());
+    }
+    Exit::Well
+}
+
+/// What would become of each job.
+fn states(plan: &Plan, store: &Store) -> Vec<State> {
+    let effort = effort(plan, None);
+    plan.jobs
         .iter()
-        .map(|job| match (&job.resolved, stored(&store, job, effort)) {
+        .map(|job| match (&job.resolved, stored(store, job, effort)) {
             (None, _) => State::Missing,
             (_, Lookup::Hit(_)) => State::Stored,
-            (Some((_, resolved)), Lookup::Miss) if known_before(&store, resolved) => State::Outdated,
+            (Some((_, resolved)), Lookup::Miss) if known_before(store, resolved) => State::Outdated,
             (_, Lookup::Miss) => State::ToRun,
             (_, Lookup::Damaged { reason, .. }) => {
                 eprintln!(
@@ -44,10 +52,7 @@ pub fn execute(arguments: Arguments) -> Exit {
                 State::ToRun
             }
         })
-        .collect();
-    // A reader who has gone away is no error.
-    let _ = io::stdout().write_all(describe(&plan, &states).as_bytes());
-    Exit::Well
+        .collect()
 }
 
 /// What would become of a job.

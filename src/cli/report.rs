@@ -1,15 +1,16 @@
-//! `vargeo report`: the report of an experiment from its stored records, without running anything.
+//! `vargeo report`: the reports of experiments from their stored records, without running anything.
 
 use super::Exit;
 use super::input::Input;
 use super::run;
+use crate::experiment::plan::Plan;
 use crate::experiment::record::Record;
 use crate::run::Finished;
 use crate::run::pool::{effort, skipped};
 use crate::run::store::{Lookup, Store};
 use std::path::PathBuf;
 
-/// Writes tables, plots, pictures and the page of an experiment from stored records, and runs nothing.
+/// Writes tables, plots, pictures and the page of each experiment from stored records, and runs nothing.
 #[derive(clap::Args)]
 pub struct Arguments {
     #[command(flatten)]
@@ -24,17 +25,22 @@ pub struct Arguments {
 
 /// Reports what is stored; jobs that never ran are named and left out.
 pub fn execute(arguments: Arguments) -> Exit {
-    let plan = match arguments.input.plan() {
-        Ok(plan) => plan,
+    let plans = match arguments.input.plans() {
+        Ok(plans) => plans,
         Err(exit) => return exit,
     };
+    let exits: Vec<Exit> = plans.iter().map(|plan| report(plan, &arguments)).collect();
+    run::gravest(&exits)
+}
+
+fn report(plan: &Plan, arguments: &Arguments) -> Exit {
     let store = Store::new(arguments.results.join("store"));
-    let effort = effort(&plan, None);
+    let effort = effort(plan, None);
     let mut finished = Vec::new();
     let mut absent = Vec::new();
     for (index, job) in plan.jobs.iter().enumerate() {
         let record: Option<Record> = match &job.resolved {
-            None => Some(skipped(&plan, job, effort)),
+            None => Some(skipped(plan, job, effort)),
             Some((key, _)) => match store.lookup(key) {
                 Lookup::Hit(record) => Some(*record),
                 Lookup::Miss => store.failure(key),
@@ -67,7 +73,7 @@ pub fn execute(arguments: Arguments) -> Exit {
     if !absent.is_empty() {
         eprintln!("warning: not stored and left out of the report: {}", absent.join(", "));
     }
-    let rows = run::rows(&plan, &store, finished);
+    let rows = run::rows(plan, &store, finished);
     match run::write_report(
         &plan.experiment,
         &rows,

@@ -1,4 +1,4 @@
-//! `vargeo run`: every job of an experiment that is not stored yet, then the report.
+//! `vargeo run`: every job of the experiments that is not stored yet, then the reports.
 
 use super::input::Input;
 use super::{Exit, progress};
@@ -8,6 +8,7 @@ use crate::experiment::nearest::suggestion;
 use crate::experiment::plan::Plan;
 use crate::experiment::record::{Record, Status};
 use crate::report::gate::Outcome;
+use crate::report::overview::{self, Entry};
 use crate::report::{self, Row};
 use crate::run::interrupt::Interrupt;
 use crate::run::store::{MESH, Store};
@@ -15,9 +16,10 @@ use crate::run::{Finished, Options, Program, Run, run_plan};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// Computes every job of an experiment that is not stored yet, and writes tables, plots, pictures and the page.
+/// Computes every job of the experiments that is not stored yet, and writes tables, plots, pictures and a page for each.
 ///
-/// Finished jobs are kept, whatever happens to the others: the same command goes on where the last one ended.
+/// Finished jobs are kept, whatever happens to the others: the same command goes on where the last one ended. Nothing
+/// runs until every file is read without an error.
 #[derive(clap::Args)]
 pub struct Arguments {
     #[command(flatten)]
@@ -51,10 +53,80 @@ pub(super) struct Running {
 
 /// Runs, then reports.
 pub fn execute(arguments: Arguments) -> Exit {
-    match arguments.input.plan().and_then(|plan| run(&plan, &arguments.running)) {
-        Ok(done) => done.exit,
+    match arguments.input.plans() {
+        Ok(plans) => each(&plans, &arguments.running, |_, done, _| done.exit),
         Err(exit) => exit,
     }
+}
+
+/// Runs one experiment after another. `judge` has the last word on how each ended; the gravest end counts for all.
+pub(super) fn each(
+    plans: &[Plan],
+    running: &Running,
+    mut judge: impl FnMut(&Plan, &Done, &report::Written) -> Exit,
+) -> Exit {
+    let interrupt = Interrupt::default();
+    // Whoever asks twice does not want to wait; job processes end with this one.
+    interrupt.listen(|count| {
+        if count > 1 {
+            std::process::exit(Exit::Interrupted as i32);
+        }
+    });
+    // With several files those are meant that have a job of the name.
+    let any = |plan: &&Plan| {
+        let named = |part: &String| plan.jobs.iter().any(|job| job.name.contains(part.as_str()));
+        running.only.is_empty() || running.only.iter().any(named)
+    };
+    let asked: Vec<&Plan> = plans.iter().filter(any).collect();
+    let asked = if asked.is_empty() {
+        plans.iter().collect()
+    } else {
+        asked
+    };
+    let mut entries = Vec::new();
+    let mut exits = Vec::new();
+    for plan in asked {
+        let chosen = match choose(plan, &running.only, plans.len() > 1) {
+            Ok(chosen) => chosen,
+            Err(exit) => return exit,
+        };
+        let done = match run(plan, running, chosen, &interrupt) {
+            Ok(done) => done,
+            Err(exit) => {
+                exits.push(exit);
+                continue;
+            }
+        };
+        let Some(written) = &done.written else {
+            return done.exit;
+        };
+        exits.push(judge(plan, &done, written));
+        entries.push(Entry::new(
+            &plan.experiment,
+            &done.rows,
+            plan.jobs.len(),
+            &written.verdicts,
+        ));
+    }
+    if plans.len() > 1 {
+        match overview::write(&entries, &running.results) {
+            Ok(_) if running.quiet => {}
+            Ok(page) => say(&format!(
+                "{}\noverview: {}",
+                overview::terminal(&entries),
+                page.display()
+            )),
+            Err(error) => exits.push(wrong(&error.to_string())),
+        }
+    }
+    gravest(&exits)
+}
+
+/// Nothing ran only where that is so of every experiment.
+pub(super) fn gravest(exits: &[Exit]) -> Exit {
+    let order = [Exit::FileWrong, Exit::ExpectationFailed, Exit::JobFailed, Exit::Well];
+    let found = order.into_iter().find(|exit| exits.contains(exit));
+    found.unwrap_or(Exit::NothingRan)
 }
 
 /// What a run and its report leave.
@@ -66,20 +138,12 @@ pub(super) struct Done {
 }
 
 /// Runs what is missing and writes the report.
-pub(super) fn run(plan: &Plan, running: &Running) -> Result<Done, Exit> {
+fn run(plan: &Plan, running: &Running, chosen: Option<Vec<usize>>, interrupt: &Interrupt) -> Result<Done, Exit> {
     let store = Store::new(running.results.join("store"));
-    let chosen = choose(plan, &running.only)?;
     if !running.quiet {
         say(&format!("{}: {} jobs", plan.experiment.title, plan.jobs.len()));
         plan.notices.iter().for_each(|notice| eprintln!("notice: {notice}"));
     }
-    let interrupt = Interrupt::default();
-    // Whoever asks twice does not want to wait; job processes end with this one.
-    interrupt.listen(|count| {
-        if count > 1 {
-            std::process::exit(Exit::Interrupted as i32);
-        }
-    });
     let options = Options {
         store: store.clone(),
         program: Program::this().map_err(|error| wrong(&format!("cannot find the program itself: {error}")))?,
@@ -87,7 +151,7 @@ pub(super) fn run(plan: &Plan, running: &Running) -> Result<Done, Exit> {
         threads: running.threads.map(|threads| threads as usize),
         force: running.force,
         only: chosen,
-        interrupt,
+        interrupt: interrupt.clone(),
     };
     let outcome = {
         let mut display = progress::display(running.quiet);
@@ -128,8 +192,9 @@ pub(super) fn run(plan: &Plan, running: &Running) -> Result<Done, Exit> {
     })
 }
 
-/// The jobs whose names are asked for; all when none are.
-fn choose(plan: &Plan, only: &[String]) -> Result<Option<Vec<usize>>, Exit> {
+/// The jobs whose names are asked for; all when none are. A name that no job has is an error, unless another file may
+/// have one.
+fn choose(plan: &Plan, only: &[String], others: bool) -> Result<Option<Vec<usize>>, Exit> {
     if only.is_empty() {
         return Ok(None);
     }
@@ -147,11 +212,14 @@ fn choose(plan: &Plan, only: &[String]) -> Result<Option<Vec<usize>>, Exit> {
         };
         let named = plan.jobs.iter().enumerate().filter(|(_, job)| asked(&job.name));
         chosen.extend(named.map(|(index, _)| index));
-        if chosen.len() == before {
+        if chosen.len() == before && !others {
             let names = plan.jobs.iter().map(|job| job.name.as_str());
             let help = suggestion(part, names).unwrap_or_else(|| "`vargeo plan FILE` lists the jobs".into());
             return Err(wrong(&format!("no job's name contains \"{part}\"\nhelp: {help}")));
         }
+    }
+    if chosen.is_empty() {
+        return Err(wrong(&format!("no job's name contains \"{}\"", only.join("\" or \""))));
     }
     chosen.sort_unstable();
     chosen.dedup();

@@ -158,10 +158,10 @@ fn keys(tidy: &Tidy) -> Result<BTreeSet<Key>, Exit> {
     let mut keys = BTreeSet::new();
     for file in &tidy.keep {
         let input = Input {
-            file: file.clone(),
+            files: vec![file.clone()],
             models: tidy.models.clone(),
         };
-        for job in input.plan()?.jobs {
+        for job in input.plans()?.into_iter().flat_map(|plan| plan.jobs) {
             match (job.resolved, job.missing) {
                 (Some((key, _)), _) => keys.extend([key]),
                 (None, missing) => {

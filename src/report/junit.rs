@@ -7,8 +7,29 @@ use crate::experiment::record::Status;
 use quick_junit::{NonSuccessKind, Report, TestCase, TestCaseStatus, TestSuite};
 use std::time::Duration;
 
-/// The whole document. Failed jobs are errors, failed expectations failures; missing optional models are skipped.
-pub fn write(name: &str, rows: &[Row], verdicts: &[Verdict]) -> Result<String, quick_junit::SerializeError> {
+/// A document of all experiments of a command.
+pub struct Document(Report);
+
+impl Document {
+    pub fn new(name: &str) -> Self {
+        Self(Report::new(name))
+    }
+
+    /// Adds an experiment. Failed jobs are errors, failed expectations failures; missing optional models are skipped.
+    pub fn add(&mut self, name: &str, rows: &[Row], verdicts: &[Verdict]) {
+        self.0.add_test_suites(suites(name, rows, verdicts));
+    }
+
+    /// The whole document.
+    ///
+    /// # Errors
+    /// Text that XML cannot hold.
+    pub fn write(&self) -> Result<String, quick_junit::SerializeError> {
+        self.0.to_string()
+    }
+}
+
+fn suites(name: &str, rows: &[Row], verdicts: &[Verdict]) -> [TestSuite; 2] {
     let mut jobs = TestSuite::new(format!("{name}: jobs"));
     for row in rows {
         let result = &row.record.result;
@@ -46,7 +67,5 @@ pub fn write(name: &str, rows: &[Row], verdicts: &[Verdict]) -> Result<String, q
         case.set_classname(format!("{name} {}", verdict.place));
         expectations.add_test_case(case);
     }
-    let mut report = Report::new(name);
-    report.add_test_suites([jobs, expectations]);
-    report.to_string()
+    [jobs, expectations]
 }

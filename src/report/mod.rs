@@ -9,6 +9,7 @@ pub mod jobs;
 pub mod junit;
 pub mod macros;
 pub mod number;
+pub mod overview;
 pub mod page;
 pub mod picture;
 pub mod plot;

@@ -45,7 +45,7 @@ impl Method for SurfaceFit {
     }
 
     fn version(&self) -> u32 {
-        3
+        4
     }
 
     fn summary(&self) -> &'static str {

@@ -89,7 +89,7 @@ fn compare(title: &str, first: &TriangleMesh, second: &TriangleMesh) {
         let built = start.elapsed().as_secs_f64();
         let start = Instant::now();
         let processor = processor_seconds();
-        let distance = one_sided(from, &tree, sampling);
+        let distance = one_sided(from, &tree, sampling, &|| false).expect("never stopped");
         let measured = start.elapsed().as_secs_f64();
         let processor = processor_seconds() - processor;
         println!(

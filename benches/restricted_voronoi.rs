@@ -3,7 +3,8 @@
 //! `cargo bench --bench restricted_voronoi -- [surface.obj] [sites...]`; a bumpy torus of 60k triangles and 1k, 10k
 //! and 100k sites by default. Sites are spread at random and relaxed by Lloyd's iteration. Figures for one thread are
 //! its own time, for several the time on the wall; the best of several runs. `l-bfgs`: 30 iterations from scattered
-//! sites.
+//! sites. With the word `l-bfgs` only these, on one thread and two in turn, with the wall's time of both, which compare
+//! only while nothing else runs.
 
 use std::f64::consts::TAU;
 use std::time::Instant;
@@ -71,6 +72,38 @@ fn best(runs: usize, alone: bool, mut work: impl FnMut()) -> f64 {
     })
 }
 
+const RELAXATION: Relaxation = Relaxation {
+    method: Method::Lbfgs,
+    iterations: 30,
+    tolerance: 0.0,
+};
+
+/// Relaxations on one thread and on two, again and again, so that both meet the same other load.
+fn in_turn(points: &[[f64; 3]], cells: &[[u32; 3]], counts: &[usize]) {
+    println!("{:>8} {:>9} {:>9} {:>9}", "sites", "1 thread", "2 threads", "ratio");
+    let pools = [1, 2].map(|threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+        pool.expect("threads")
+    });
+    for &count in counts {
+        let start = scatter(points, cells, count, 1);
+        let mut term = SquaredDistance::new(points, cells).expect("a valid surface");
+        let mut least = [f64::INFINITY; 2];
+        for _ in 0..(100_000 / count).clamp(3, 10) {
+            for (pool, least) in pools.iter().zip(&mut least) {
+                let time = pool.install(|| {
+                    best(1, false, || {
+                        relax(&mut term, points, &start, &RELAXATION, &mut Silent);
+                    })
+                });
+                *least = least.min(time);
+            }
+        }
+        let [one, two] = least;
+        println!("{count:>8} {one:>9.1} {two:>9.1} {:>9.3}", one / two);
+    }
+}
+
 fn main() {
     let words: Vec<String> = std::env::args().skip(1).filter(|word| !word.starts_with('-')).collect();
     let file = words.iter().find(|word| word.ends_with(".obj"));
@@ -80,6 +113,9 @@ fn main() {
     }
     let (points, cells) = file.map_or_else(|| torus(300, 100), |file| read(file));
     println!("{} triangles; milliseconds", cells.len());
+    if words.iter().any(|word| word == "l-bfgs") {
+        return in_turn(&points, &cells, &counts);
+    }
     println!(
         "{:>8} {:>7} {:>9} {:>9} {:>9} {:>9} {:>9} {:>9} {:>8}",
         "sites", "threads", "tree", "value", "gradient", "s=50", "surface", "l-bfgs", "pieces"
@@ -147,13 +183,8 @@ fn main() {
                     term.evaluate(&points, &tree, &plain, wanted);
                 });
                 let start = scatter(&points, &cells, count, 1);
-                let relaxation = Relaxation {
-                    method: Method::Lbfgs,
-                    iterations: 30,
-                    tolerance: 0.0,
-                };
                 let relaxed = best(1, threads == 1, || {
-                    relax(&mut term, &points, &start, &relaxation, &mut Silent);
+                    relax(&mut term, &points, &start, &RELAXATION, &mut Silent);
                 });
                 println!(
                     "{count:>8} {threads:>7} {build:>9.2} {value:>9.2} {gradient:>9.2} {anisotropic:>9.2} {surface:>9.2} {relaxed:>9.1} {pieces:>8}"

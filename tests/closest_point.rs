@@ -168,7 +168,7 @@ fn distances_between_surfaces_with_known_values() {
         .position(|point| *point == [0.0, 0.0, 1.0])
         .expect("the middle of the upper side is a vertex");
     raised.points[top][2] = 1.1;
-    let found = hausdorff(&raised, &cube).unwrap();
+    let found = hausdorff(&raised, &cube, &never).unwrap();
     let diagonal = 12f64.sqrt();
     assert!((found.diagonal - diagonal).abs() < 1e-12);
     assert!((found.forward.max - 0.1).abs() < 1e-12, "{}", found.forward.max);
@@ -196,10 +196,45 @@ fn distances_between_surfaces_with_known_values() {
         let parameters = serde_json::json!({ "triangles": 3000, "a": radius, "b": radius, "c": radius });
         generate_shape("ellipsoid", &parameters).unwrap()
     };
-    let found = hausdorff(&sphere(1.0), &sphere(1.1)).unwrap();
+    let found = hausdorff(&sphere(1.0), &sphere(1.1), &never).unwrap();
     for distance in [&found.forward, &found.backward] {
         assert!((distance.mean - 0.1).abs() < 2e-3 && (distance.max - 0.1).abs() < 5e-3);
         assert!(distance.rms >= distance.mean && distance.rms <= distance.max);
+    }
+}
+
+/// For a measurement that is not to be stopped.
+fn never() -> bool {
+    false
+}
+
+#[test]
+fn a_measurement_can_be_stopped_at_any_time() {
+    // Concentric spheres are as far from each other everywhere: no part of the search is cut short.
+    let sphere = |radius: f64| {
+        let parameters = serde_json::json!({ "triangles": 3000, "a": radius, "b": radius, "c": radius });
+        generate_shape("ellipsoid", &parameters).unwrap()
+    };
+    let (first, second) = (sphere(1.0), sphere(1.1));
+    let asked = std::cell::Cell::new(0);
+    let count = |last: u32| {
+        asked.set(0);
+        hausdorff(&first, &second, &|| {
+            asked.set(asked.get() + 1);
+            asked.get() >= last
+        })
+    };
+    let whole = count(u32::MAX).unwrap();
+    let questions = asked.get();
+    // Sampling and searching, both ways, and again and again within.
+    let work = whole.forward.samples + whole.backward.samples;
+    assert!(
+        questions >= 4 && u64::from(questions) >= work / 2_000_000,
+        "{questions} for {work} samples"
+    );
+    for last in 1..=questions {
+        assert!(count(last).is_err(), "asked {last} times");
+        assert_eq!(asked.get(), last, "goes on after it was told to stop");
     }
 }
 
@@ -221,12 +256,12 @@ fn maximum_between_samples_is_found_and_certain() {
         spacing: 2.0,
         tolerance: 1e-4,
     };
-    let distance = one_sided(&flat, &ClosestPoint::new(&cone), sampling);
+    let distance = one_sided(&flat, &ClosestPoint::new(&cone), sampling, &never).unwrap();
     let finer = Sampling {
         spacing: 0.004,
         tolerance: 1e-5,
     };
-    let reference = one_sided(&flat, &ClosestPoint::new(&cone), finer);
+    let reference = one_sided(&flat, &ClosestPoint::new(&cone), finer, &never).unwrap();
     assert!(distance.max <= reference.bound && reference.max <= distance.bound);
     assert!(
         distance.bound - distance.max <= 1e-4 + 1e-12,
@@ -245,7 +280,7 @@ fn same_bits_with_any_number_of_threads() {
     let (first, second) = (shape(0.01), shape(0.0));
     let run = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| hausdorff(&first, &second).unwrap())
+        pool.install(|| hausdorff(&first, &second, &never).unwrap())
     };
     let one = run(1);
     assert!(one.max() > 0.0);

@@ -477,6 +477,40 @@ fn many_sites_as_near() {
     assert_eq!(owners, [0, 0]);
 }
 
+/// All sites around the axis of a fan are as near to it, so that every triangle has all of them as contenders; few own
+/// a part of it.
+#[test]
+fn fans_are_cut_among_few() {
+    let count: u32 = 600;
+    let circle = |turn: f64, radius: f64, z: f64| -> Vec<Point> {
+        (0..count)
+            .map(|k| ((f64::from(k) + turn) / f64::from(count) * std::f64::consts::TAU).sin_cos())
+            .map(|(s, c)| [radius * c, radius * s, z])
+            .collect()
+    };
+    let mut points = circle(0.0, 1.0, 0.0);
+    points.push([0.0; 3]);
+    let cells: Vec<[u32; 3]> = (0..count).map(|k| [count, k, (k + 1) % count]).collect();
+    let sites = circle(0.3, 0.5, 0.25);
+    let mut diagram = RestrictedVoronoi::new(&points, &cells).expect("a valid surface");
+    let mut areas = vec![0.0; sites.len()];
+    let mut pieces = 0;
+    let ways = diagram.pieces(&points, &PointTree::new(&sites), None, |piece| {
+        areas[piece.site as usize] += piece.area;
+        pieces += 1;
+    });
+    assert_eq!(
+        (ways.walked, ways.clipped, ways.exact),
+        (count as usize, 0, 0),
+        "{ways:?}"
+    );
+    assert!(pieces <= 3 * count, "{pieces} pieces");
+    let expected = 0.5 * (std::f64::consts::TAU / f64::from(count)).sin();
+    for area in areas {
+        assert!((area / expected - 1.0).abs() < 1e-3, "{area} for {expected}");
+    }
+}
+
 #[test]
 fn impossible_inputs() {
     assert_eq!(

@@ -13,6 +13,7 @@ use super::restricted_voronoi::Error;
 use super::squared_distance::{Options, SquaredDistance, Wanted};
 use crate::linalg::vector3::{add, cross, dot, times};
 use crate::mesh::{length, subtract};
+use crate::optimize::entries::scale;
 use crate::optimize::lbfgs::Lbfgs;
 use crate::optimize::{Counters, Iterate, Objective, Observer, Silent, Solution, StopReason, Stopping};
 
@@ -93,9 +94,7 @@ struct Energy<'a> {
 
 impl Energy<'_> {
     fn place(&mut self, x: &[f64]) {
-        for (site, x) in self.sites.iter_mut().flatten().zip(x) {
-            *site = x * self.unit;
-        }
+        scale(x, self.unit, self.sites.as_flattened_mut());
         self.tree.set(&self.sites);
     }
 }
@@ -120,9 +119,7 @@ impl Objective for Energy<'_> {
             ..Wanted::default()
         };
         let value = self.term.evaluate(self.points, &self.tree, &Options::default(), wanted);
-        for (target, force) in gradient.iter_mut().zip(self.gradient.iter().flatten()) {
-            *target = force * self.unit / self.scale;
-        }
+        scale(self.gradient.as_flattened(), self.unit / self.scale, gradient);
         value / self.scale
     }
 }

@@ -68,14 +68,20 @@ pub fn place(point: [f64; 3]) -> [u64; 3] {
 /// neighbours, by rising index; false when there are certainly none. `keys` is memory to reuse. Points that are not
 /// finite may come anywhere.
 pub fn order(points: &[[f64; 3]], keys: &mut Vec<u64>, order: &mut Vec<u32>) -> bool {
-    let mut low = [f64::INFINITY; 3];
-    let mut high = [f64::NEG_INFINITY; 3];
-    for point in points {
-        for axis in 0..3 {
-            low[axis] = low[axis].min(point[axis]);
-            high[axis] = high[axis].max(point[axis]);
-        }
-    }
+    let shared_work = points.len() >= MANY && rayon::current_num_threads() > 1;
+    let (low, high) = if shared_work {
+        (points.par_chunks(MANY).map(bounds)).reduce(
+            || bounds(&[]),
+            |(low, high), (other_low, other_high)| {
+                (
+                    std::array::from_fn(|axis| low[axis].min(other_low[axis])),
+                    std::array::from_fn(|axis| high[axis].max(other_high[axis])),
+                )
+            },
+        )
+    } else {
+        bounds(points)
+    };
     let index_bits = u32::BITS - (points.len().saturating_sub(1) as u32).leading_zeros();
     let bits = BITS.min((u64::BITS - index_bits) / 3);
     let mask = (1u32 << bits) - 1;
@@ -101,7 +107,7 @@ pub fn order(points: &[[f64; 3]], keys: &mut Vec<u64>, order: &mut Vec<u32>) -> 
     // Keys differ by their indices, so that every way of sorting gives the same order.
     keys.clear();
     keys.resize(points.len(), 0);
-    if points.len() >= MANY && rayon::current_num_threads() > 1 {
+    if shared_work {
         keys.par_chunks_mut(WIDTH)
             .zip(points.par_chunks(WIDTH))
             .enumerate()
@@ -115,8 +121,17 @@ pub fn order(points: &[[f64; 3]], keys: &mut Vec<u64>, order: &mut Vec<u32>) -> 
             .for_each(fill);
         keys.sort_unstable();
     }
-    order.clear();
-    order.extend(keys.iter().map(|key| (key & ((1 << index_bits) - 1)) as u32));
+    let index = |key: &u64| (key & ((1 << index_bits) - 1)) as u32;
+    if shared_work {
+        keys.par_iter().with_min_len(MANY).map(index).collect_into_vec(order);
+        let in_one_cell = |pair: &[u64]| pair[0] >> index_bits == pair[1] >> index_bits;
+        if !keys.par_windows(2).with_min_len(MANY).any(in_one_cell) {
+            return false;
+        }
+    } else {
+        order.clear();
+        order.extend(keys.iter().map(index));
+    }
     let mut shared = false;
     let mut start = 0;
     for end in 1..=keys.len() {
@@ -130,6 +145,19 @@ pub fn order(points: &[[f64; 3]], keys: &mut Vec<u64>, order: &mut Vec<u32>) -> 
         start = end;
     }
     shared
+}
+
+/// The corners of the box around points; the empty box without any.
+fn bounds(points: &[[f64; 3]]) -> ([f64; 3], [f64; 3]) {
+    let mut low = [f64::INFINITY; 3];
+    let mut high = [f64::NEG_INFINITY; 3];
+    for point in points {
+        for axis in 0..3 {
+            low[axis] = low[axis].min(point[axis]);
+            high[axis] = high[axis].max(point[axis]);
+        }
+    }
+    (low, high)
 }
 
 /// Puts the points of one cell of the grid in order.

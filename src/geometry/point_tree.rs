@@ -23,7 +23,12 @@ pub const LARGEST: f64 = 1e150;
 
 /// True when every coordinate is a number below [`LARGEST`] in magnitude.
 pub fn within_reach(points: &[[f64; 3]]) -> bool {
-    points.iter().flatten().all(|x| x.abs() < LARGEST)
+    let run = |points: &[[f64; 3]]| points.iter().flatten().all(|x| x.abs() < LARGEST);
+    if points.len() >= MANY && rayon::current_num_threads() > 1 {
+        points.par_chunks(MANY).all(run)
+    } else {
+        run(points)
+    }
 }
 
 /// Eight boxes side by side. An absent box lies at infinity.

@@ -20,6 +20,8 @@
 use super::point_tree::PointTree;
 use super::restricted_voronoi::{Candidate, Compatibility, Cut, Error, RestrictedVoronoi, Visitor};
 use crate::linalg::vector3::{add, cross, dot, subtract, times};
+use rayon::prelude::*;
+use std::ops::Range;
 
 /// Weights the distance along normals.
 #[derive(Clone, Copy, Debug, Default)]
@@ -217,10 +219,10 @@ impl SquaredDistance {
         // Whole triangles of the plain distance have a short formula.
         let plain = !anisotropic && options.compatibility.is_none() && !(work.surface || work.normals);
         let positions = sites.points();
-        self.chunks.iter_mut().for_each(Chunk::clear);
         let done = self
             .diagram
             .sweep(points, sites, options.compatibility, &mut self.chunks, |chunk| {
+                chunk.clear();
                 Integral {
                     chunk,
                     options,
@@ -236,40 +238,74 @@ impl SquaredDistance {
                 f64::INFINITY
             };
         }
+        let Self { diagram, chunks } = self;
         if let Some(surface) = wanted.surface {
-            surface.fill([0.0; 3]);
-            for chunk in &self.chunks {
-                for (&triangle, forces) in chunk.triangles.iter().zip(&chunk.forces) {
-                    for (&vertex, &force) in self.diagram.cells()[triangle as usize].iter().zip(forces) {
-                        let total = &mut surface[vertex as usize];
-                        *total = add(*total, force);
+            in_ranges(surface, [0.0; 3], |range, surface| {
+                for chunk in &*chunks {
+                    for (&triangle, forces) in chunk.triangles.iter().zip(&chunk.forces) {
+                        for (&vertex, &force) in diagram.cells()[triangle as usize].iter().zip(forces) {
+                            if range.contains(&(vertex as usize)) {
+                                let total = &mut surface[vertex as usize - range.start];
+                                *total = add(*total, force);
+                            }
+                        }
                     }
                 }
-            }
+            });
         }
-        let chunks = &self.chunks;
         let gather = |target: Option<&mut [[f64; 3]]>, first: usize| {
             let Some(target) = target else { return };
-            target.fill([0.0; 3]);
-            for chunk in chunks {
-                for (&site, sums) in chunk.sites.iter().zip(&chunk.sums) {
-                    let total = &mut target[site as usize];
-                    *total = add(*total, [sums[first], sums[first + 1], sums[first + 2]]);
+            in_ranges(target, [0.0; 3], |range, target| {
+                for chunk in &*chunks {
+                    for (&site, sums) in chunk.sites.iter().zip(&chunk.sums) {
+                        if range.contains(&(site as usize)) {
+                            let total = &mut target[site as usize - range.start];
+                            *total = add(*total, [sums[first], sums[first + 1], sums[first + 2]]);
+                        }
+                    }
                 }
-            }
+            });
         };
         gather(wanted.sites, GRADIENT);
         gather(wanted.normals, NORMAL);
         gather(wanted.moments, MOMENT);
         if let Some(areas) = wanted.areas {
-            areas.fill(0.0);
-            for chunk in chunks {
-                for (&site, sums) in chunk.sites.iter().zip(&chunk.sums) {
-                    areas[site as usize] += sums[AREA];
+            in_ranges(areas, 0.0, |range, areas| {
+                for chunk in &*chunks {
+                    for (&site, sums) in chunk.sites.iter().zip(&chunk.sums) {
+                        if range.contains(&(site as usize)) {
+                            areas[site as usize - range.start] += sums[AREA];
+                        }
+                    }
                 }
-            }
+            });
         }
-        self.chunks.iter().map(|chunk| chunk.value).sum()
+        chunks.iter().map(|chunk| chunk.value).sum()
+    }
+}
+
+/// From this number of sums on, threads share them.
+const MANY: usize = 1 << 13;
+/// but no more than so many, for going through all takes time as well.
+const MOST: usize = 8;
+
+/// Clears sums and lets `add` add to those with indices in a range, for all ranges. Every thread goes through all that
+/// is to be added and takes its own, so that each sum is added up in one order however many threads there are.
+fn in_ranges<T: Copy + Send + Sync>(sums: &mut [T], zero: T, add: impl Fn(Range<usize>, &mut [T]) + Sync) {
+    let threads = if sums.len() < MANY {
+        1
+    } else {
+        rayon::current_num_threads().min(MOST)
+    };
+    let size = sums.len().div_ceil(threads).max(1);
+    let part = |(index, sums): (usize, &mut [T])| {
+        sums.fill(zero);
+        add(index * size..index * size + sums.len(), sums);
+    };
+    if threads == 1 {
+        sums.chunks_mut(size).enumerate().for_each(part);
+    } else {
+        sums.par_chunks_mut(size).enumerate().for_each(part);
     }
 }
 

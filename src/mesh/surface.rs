@@ -27,6 +27,13 @@ impl Surface {
     pub fn from_content(content: &Content) -> Result<Surface, String> {
         content.cells().check(content.points.len())?;
         if content.triangles.is_empty() && content.quads.is_empty() {
+            let volumes = content.tetrahedra.len() + content.hexahedra.len() + content.prisms.len();
+            if volumes > 0 {
+                return Err(format!(
+                    "there are {volumes} solid cells but no triangles or quadrilaterals; give the surface of the volume, or \
+                     the file with its boundary faces"
+                ));
+            }
             return Err(format!(
                 "there are {} points but no triangles or quadrilaterals; give a surface",
                 content.points.len()

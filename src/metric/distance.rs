@@ -30,6 +30,11 @@ const FEW_PARTS: usize = 16;
 const SAMPLES: f64 = 4e7;
 /// Most pieces that the search for the maximum looks at in one triangle.
 const PIECES: usize = 100_000;
+/// Samples after which it is asked whether to stop,
+const SAMPLES_AT_ONCE: usize = 1 << 20;
+/// and chunks hunted at once, with so many pieces in each.
+const HUNTS_AT_ONCE: usize = 64;
+const PIECES_AT_ONCE: usize = 4096;
 /// Triangles with a sample beyond this share of the largest are searched to [`SHARP`] of it.
 const PROMISING: f64 = 0.8;
 const SHARP: f64 = 1e-3;
@@ -134,11 +139,12 @@ impl Hausdorff {
     }
 }
 
-/// Distances between two surfaces, each against the other's tree, sampled relative to the second one's diagonal.
+/// Distances between two surfaces, each against the other's tree, sampled relative to the second one's diagonal. `stop` is
+/// asked every fraction of a second whether to give up.
 ///
 /// # Errors
-/// For a surface without triangles and for a second surface of size zero.
-pub fn hausdorff(first: &TriangleMesh, second: &TriangleMesh) -> Result<Hausdorff, String> {
+/// For a surface without triangles, for a second surface of size zero, and when `stop` says so.
+pub fn hausdorff(first: &TriangleMesh, second: &TriangleMesh, stop: &dyn Fn() -> bool) -> Result<Hausdorff, String> {
     for (name, surface) in [("first", first), ("second", second)] {
         if surface.cells.is_empty() {
             return Err(format!("the {name} surface has no triangles, so there is no distance"));
@@ -151,9 +157,12 @@ pub fn hausdorff(first: &TriangleMesh, second: &TriangleMesh) -> Result<Hausdorf
         ));
     }
     let sampling = Sampling::of_diagonal(diagonal);
+    let distance = |from: &TriangleMesh, to: &TriangleMesh| {
+        one_sided(from, &ClosestPoint::new(to), sampling, stop).ok_or("stopped from outside")
+    };
     Ok(Hausdorff {
-        forward: one_sided(first, &ClosestPoint::new(second), sampling),
-        backward: one_sided(second, &ClosestPoint::new(first), sampling),
+        forward: distance(first, second)?,
+        backward: distance(second, first)?,
         diagonal,
     })
 }
@@ -191,20 +200,43 @@ struct Sums {
     place: [f64; 3],
 }
 
-/// Distances from a surface to the one of a tree.
+/// Distances from a surface to the one of a tree; `None` when `stop` says so, which is asked every fraction of a second.
 ///
 /// # Panics
 /// When the surface has no triangles.
-pub fn one_sided(surface: &TriangleMesh, to: &ClosestPoint, sampling: Sampling) -> Distance {
+pub fn one_sided(
+    surface: &TriangleMesh,
+    to: &ClosestPoint,
+    sampling: Sampling,
+    stop: &dyn Fn() -> bool,
+) -> Option<Distance> {
     assert!(!surface.cells.is_empty(), "a surface with at least one triangle");
     let mut cells = vec![0.0; surface.cells.len()];
     let spacing = affordable(surface, sampling.spacing);
-    let sums: Vec<Sums> = surface
-        .cells
-        .par_chunks(CHUNK)
-        .zip(cells.par_chunks_mut(CHUNK))
-        .map(|(triangles, largest)| sample(surface, triangles, to, spacing, largest))
-        .collect();
+    let mut sums: Vec<Sums> = Vec::new();
+    let mut begin = 0;
+    while begin < surface.cells.len() {
+        if stop() {
+            return None;
+        }
+        // Whole chunks until there are enough samples for one go.
+        let mut end = begin;
+        let mut planned = 0;
+        while end < surface.cells.len() && planned < SAMPLES_AT_ONCE {
+            let next = (end + CHUNK).min(surface.cells.len());
+            planned += surface.cells[end..next]
+                .iter()
+                .map(|&cell| 2 * parts_of(surface.corners(cell), spacing).pow(2))
+                .sum::<usize>();
+            end = next;
+        }
+        sums.par_extend(
+            (surface.cells[begin..end].par_chunks(CHUNK))
+                .zip(cells[begin..end].par_chunks_mut(CHUNK))
+                .map(|(triangles, largest)| sample(surface, triangles, to, spacing, largest)),
+        );
+        begin = end;
+    }
     let (mut area, mut first, mut second, mut samples) = (0.0, 0.0, 0.0, 0);
     let (mut max, mut place) = (0.0, surface.corners(surface.cells[0])[0]);
     for sums in &sums {
@@ -227,25 +259,32 @@ pub fn one_sided(surface: &TriangleMesh, to: &ClosestPoint, sampling: Sampling) 
                 sampling.tolerance,
             )
         };
-        let hunts: Vec<Hunt> = surface
-            .cells
-            .par_chunks(CHUNK)
-            .zip(cells.par_chunks(CHUNK))
-            .map(|(triangles, largest)| {
-                let mut hunt = Hunt {
+        let mut hunts: Vec<Hunt> = (surface.cells.chunks(CHUNK).zip(cells.chunks(CHUNK)))
+            .enumerate()
+            .filter_map(|(chunk, (_, largest))| {
+                let mut triangles = (0..largest.len()).filter(|&k| (largest[k] >= PROMISING * sampled) == promising);
+                let triangles: Vec<usize> = triangles.by_ref().map(|k| chunk * CHUNK + k).collect();
+                (!triangles.is_empty()).then(|| Hunt {
                     max,
                     place,
                     bound: max,
                     visits: 0,
-                };
-                for (&triangle, &largest) in triangles.iter().zip(largest) {
-                    if (largest >= PROMISING * sampled) == promising {
-                        hunt.search(surface.corners(triangle), to, tolerance);
-                    }
-                }
-                hunt
+                    triangles: triangles.into_iter(),
+                    due: Vec::new(),
+                    budget: 0,
+                })
             })
             .collect();
+        for hunts in hunts.chunks_mut(HUNTS_AT_ONCE) {
+            while !hunts.iter().all(Hunt::is_over) {
+                if stop() {
+                    return None;
+                }
+                hunts
+                    .par_iter_mut()
+                    .for_each(|hunt| hunt.search(surface, to, tolerance));
+            }
+        }
         for hunt in hunts {
             samples += hunt.visits;
             bound = bound.max(hunt.bound);
@@ -256,7 +295,7 @@ pub fn one_sided(surface: &TriangleMesh, to: &ClosestPoint, sampling: Sampling) 
     }
     // A surface without area has no mean; its samples weigh alike.
     let weight = if area > 0.0 { area } else { f64::NAN };
-    Distance {
+    Some(Distance {
         max,
         bound: bound.max(max),
         place,
@@ -264,7 +303,7 @@ pub fn one_sided(surface: &TriangleMesh, to: &ClosestPoint, sampling: Sampling) 
         rms: (second / weight).sqrt(),
         cells,
         samples,
-    }
+    })
 }
 
 /// How many parts the edges of a triangle are divided into. Slivers have longer parts than the spacing asks for, so
@@ -275,17 +314,21 @@ fn parts(longest: f64, area_vector: [f64; 3], spacing: f64) -> usize {
     ((longest / spacing).ceil() as usize).clamp(1, most)
 }
 
+fn parts_of(corners: [[f64; 3]; 3], spacing: f64) -> usize {
+    let [a, b, c] = corners;
+    let longest = length(subtract(b, a))
+        .max(length(subtract(c, b)))
+        .max(length(subtract(a, c)));
+    parts(longest, area_vector(corners), spacing)
+}
+
 /// The spacing, or a larger one where a surface is so large that there would be too many samples.
 fn affordable(surface: &TriangleMesh, spacing: f64) -> f64 {
     let samples: f64 = surface
         .cells
         .iter()
         .map(|&cell| {
-            let [a, b, c] = surface.corners(cell);
-            let longest = length(subtract(b, a))
-                .max(length(subtract(c, b)))
-                .max(length(subtract(a, c)));
-            let parts = parts(longest, area_vector([a, b, c]), spacing) as f64;
+            let parts = parts_of(surface.corners(cell), spacing) as f64;
             1.5 * parts * parts
         })
         .sum();
@@ -315,8 +358,7 @@ fn sample(
         let corners = surface.corners(triangle);
         let [a, b, c] = corners;
         let (first, second) = (subtract(b, a), subtract(c, a));
-        let longest = length(first).max(length(second)).max(length(subtract(c, b)));
-        let parts = parts(longest, area_vector(corners), spacing);
+        let parts = parts_of(corners, spacing);
         points.clear();
         weights.clear();
         let scale = 1.0 / parts as f64;
@@ -377,6 +419,10 @@ struct Hunt {
     /// Largest bound of the pieces that were dropped.
     bound: f64,
     visits: u64,
+    /// Triangles to go, and what is left of the one begun.
+    triangles: std::vec::IntoIter<usize>,
+    due: Vec<Piece>,
+    budget: usize,
 }
 
 /// A part of a triangle with the answers at its corners.
@@ -413,13 +459,25 @@ impl Piece {
 }
 
 impl Hunt {
-    fn search(&mut self, corners: [[f64; 3]; 3], to: &ClosestPoint, tolerance: f64) {
-        let mut found = [NOWHERE; 3];
-        to.nearest_each(&corners, None, &mut found);
-        self.visits += 3;
-        let mut due = vec![Piece { corners, found }];
-        let mut budget = PIECES;
-        while let Some(piece) = due.pop() {
+    fn is_over(&self) -> bool {
+        self.due.is_empty() && self.triangles.len() == 0
+    }
+
+    /// Goes on for so many pieces.
+    fn search(&mut self, surface: &TriangleMesh, to: &ClosestPoint, tolerance: f64) {
+        for _ in 0..PIECES_AT_ONCE {
+            let piece = match self.due.pop() {
+                Some(piece) => piece,
+                None => {
+                    let Some(triangle) = self.triangles.next() else { return };
+                    let corners = surface.corners(surface.cells[triangle]);
+                    let mut found = [NOWHERE; 3];
+                    to.nearest_each(&corners, None, &mut found);
+                    self.visits += 3;
+                    self.budget = PIECES;
+                    Piece { corners, found }
+                }
+            };
             for (nearest, corner) in piece.found.iter().zip(piece.corners) {
                 let distance = nearest.squared_distance.sqrt();
                 if distance > self.max {
@@ -427,11 +485,11 @@ impl Hunt {
                 }
             }
             let bound = piece.bound(to);
-            if !(bound > self.max + tolerance) || budget == 0 {
+            if !(bound > self.max + tolerance) || self.budget == 0 {
                 self.bound = self.bound.max(bound);
                 continue;
             }
-            budget -= 1;
+            self.budget -= 1;
             let [a, b, c] = piece.corners;
             let middle =
                 |a: [f64; 3], b: [f64; 3]| -> [f64; 3] { std::array::from_fn(|axis| 0.5 * (a[axis] + b[axis])) };
@@ -439,7 +497,7 @@ impl Hunt {
             let mut between = [NOWHERE; 3];
             to.nearest_each(&middles, Some(piece.found[1].triangle), &mut between);
             self.visits += 3;
-            due.push(Piece {
+            self.due.push(Piece {
                 corners: middles,
                 found: between,
             });
@@ -448,7 +506,7 @@ impl Hunt {
                 let (mut corners, mut found) = (middles, between);
                 corners[corner] = piece.corners[corner];
                 found[corner] = piece.found[corner];
-                due.push(Piece { corners, found });
+                self.due.push(Piece { corners, found });
             }
         }
     }

@@ -2,9 +2,9 @@
 //!
 //! Guaranteed: the energy never increases, and every iterate has a finite value. Not guaranteed: a global minimum.
 
+use super::entries::{add_scaled, dot, multiply, norm, scale, subtract};
 use super::line_search::{Start, StrongWolfe};
-use super::{Counters, Iterate, Objective, Observer, Solution, StopReason, Stopping, dot, norm};
-use rayon::prelude::*;
+use super::{Counters, Iterate, Objective, Observer, Solution, StopReason, Stopping};
 use std::collections::VecDeque;
 
 pub(super) const SUMMARY: &str =
@@ -180,38 +180,6 @@ impl Lbfgs {
     }
 }
 
-/// From this number of unknowns on, threads share the work on single entries; sums stay in one order.
-const MANY: usize = 1 << 15;
-/// Unknowns for one thread at a time.
-const RUN: usize = 1 << 13;
-
-/// `difference = a - b`.
-fn subtract(a: &[f64], b: &[f64], difference: &mut [f64]) {
-    let run = |(difference, (a, b)): (&mut [f64], (&[f64], &[f64]))| {
-        for (difference, (a, b)) in difference.iter_mut().zip(a.iter().zip(b)) {
-            *difference = a - b;
-        }
-    };
-    if difference.len() < MANY {
-        return run((difference, (a, b)));
-    }
-    let parts = a.par_chunks(RUN).zip(b.par_chunks(RUN));
-    difference.par_chunks_mut(RUN).zip(parts).for_each(run);
-}
-
-/// `sum += factor x`.
-fn add_scaled(sum: &mut [f64], factor: f64, x: &[f64]) {
-    let run = |(sum, x): (&mut [f64], &[f64])| {
-        for (sum, x) in sum.iter_mut().zip(x) {
-            *sum += factor * x;
-        }
-    };
-    if sum.len() < MANY {
-        return run((sum, x));
-    }
-    sum.par_chunks_mut(RUN).zip(x.par_chunks(RUN)).for_each(run);
-}
-
 /// `direction = -H gradient` with the inverse Hessian `H` that the remembered steps stand for.
 fn two_loops(
     objective: &mut (impl Objective + ?Sized),
@@ -221,30 +189,28 @@ fn two_loops(
     coefficients: &mut [f64],
     room: &mut [f64],
 ) {
-    for (direction, gradient) in direction.iter_mut().zip(gradient) {
-        *direction = -gradient;
-    }
+    scale(gradient, -1.0, direction);
     for (pair, coefficient) in pairs.iter().zip(coefficients.iter_mut()).rev() {
         *coefficient = pair.inverse * dot(&pair.point, direction);
         add_scaled(direction, -*coefficient, &pair.gradient);
     }
-    let mut scale = 1.0;
     let preconditioned = objective.is_preconditioned();
-    if let Some(last) = pairs.back() {
-        // The curvature along the last step as the model without memory sees it.
-        room.copy_from_slice(&last.gradient);
-        if preconditioned {
+    // The curvature along the last step as the model without memory sees it.
+    let factor = pairs.back().map(|last| {
+        let seen = if preconditioned {
+            room.copy_from_slice(&last.gradient);
             objective.precondition(room);
-        }
-        scale = 1.0 / (last.inverse * dot(&last.gradient, room));
-    }
+            &*room
+        } else {
+            &last.gradient
+        };
+        1.0 / (last.inverse * dot(&last.gradient, seen))
+    });
     if preconditioned {
         objective.precondition(direction);
     }
-    if scale != 1.0 {
-        for direction in direction.iter_mut() {
-            *direction *= scale;
-        }
+    if let Some(factor) = factor {
+        multiply(direction, factor);
     }
     for (pair, &coefficient) in pairs.iter().zip(coefficients.iter()) {
         let correction = coefficient - pair.inverse * dot(&pair.gradient, direction);

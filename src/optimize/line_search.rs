@@ -3,7 +3,8 @@
 //! Every accepted point has a finite value that was computed at that very point; a bound on the step is a help, never
 //! trusted alone. A value of infinity or not-a-number counts as a step too long.
 
-use super::{Objective, dot, norm};
+use super::Objective;
+use super::entries::{combine, dot, norm};
 
 /// Share of the largest safe step that is tried first.
 pub const SAFETY: f64 = 0.9;
@@ -279,7 +280,5 @@ fn first_length(objective: &mut (impl Objective + ?Sized), start: &Start<'_>) ->
 }
 
 fn advance(start: &Start<'_>, length: f64, point: &mut [f64]) {
-    for ((point, &x), &direction) in point.iter_mut().zip(start.x).zip(start.direction) {
-        *point = x + length * direction;
-    }
+    combine(start.x, length, start.direction, point);
 }

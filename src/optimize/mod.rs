@@ -3,9 +3,12 @@
 //! A failed line search is a stop reason, never a warning. Nothing here reads a clock: limits arrive through the
 //! observer.
 
+pub mod entries;
 pub mod line_search;
 pub mod newton;
 pub mod lbfgs;
+
+pub use entries::{dot, norm};
 
 use crate::linalg::sparse::NotPositive;
 use serde::{Deserialize, Serialize};
@@ -258,14 +261,4 @@ pub fn minimizers() -> [Minimizer; 2] {
         Minimizer::Newton(newton::Newton::default()),
         Minimizer::Lbfgs(lbfgs::Lbfgs::default()),
     ]
-}
-
-/// Inner product, summed in order.
-pub fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
-}
-
-/// Euclidean norm.
-pub fn norm(a: &[f64]) -> f64 {
-    dot(a, a).sqrt()
 }

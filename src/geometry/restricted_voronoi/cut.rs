@@ -18,6 +18,10 @@ use crate::linalg::vector3::{add, dot, subtract};
 
 /// Triangles with more candidates are subdivided first.
 const MANY: usize = 48;
+/// Among no more contenders than this those that own nothing do no harm.
+const FEW: usize = 16;
+/// What is rounding in a difference of height functions, as a share of its terms.
+const ROUNDING: f64 = 32.0 * f64::EPSILON;
 
 /// One triangle with the sites that may own a part of it.
 pub(crate) struct Cut<'a> {
@@ -136,14 +140,25 @@ impl Cutter {
         let (own, mut scale) = reference.candidate(frame, reference.site, origin, reference_offset);
         candidates.clear();
         candidates.push(own);
+        // Sites as far from a corner as the reference is, but for rounding, are contenders. Around the axis of a fan all
+        // are, in every triangle; farther from the rest of it they own nothing.
+        let crowded = found.len() > FEW;
         for &site in found.iter() {
             if site != reference.site {
                 let (candidate, size) = reference.candidate(frame, site, positions[site as usize], offset(site));
+                if crowded {
+                    let slack = ROUNDING * size;
+                    let [a, b, c] = candidate.height;
+                    let values = frame.corners.map(|[u, v]| a * u + b * v + c);
+                    if values.iter().all(|&value| value >= -slack) && values.iter().any(|&value| value > slack) {
+                        continue;
+                    }
+                }
                 candidates.push(candidate);
                 scale = scale.max(size);
             }
         }
-        32.0 * f64::EPSILON * scale
+        ROUNDING * scale
     }
 
     /// Writes the polygons of two candidates or more. Differences of height functions below `tolerance` are rounding.

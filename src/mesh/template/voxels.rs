@@ -21,17 +21,31 @@ pub fn voxels(surface: &TriangleMesh, along: usize) -> Result<MixedMesh, String>
     let start: [f64; 3] = std::array::from_fn(|axis| 0.5 * (low[axis] + high[axis]) - 0.5 * counts[axis] as f64 * size);
     let place = |[i, j, k]: [usize; 3]| i + counts[0] * (j + counts[1] * k);
     let mut inside = vec![false; counts.iter().product()];
-    for j in 0..counts[1] {
-        for i in 0..counts[0] {
-            // Off the middle by an irrational share, so that the line meets no edge of a regular surface.
-            let x = start[0] + (i as f64 + 0.5 + 1.1234567e-5) * size;
-            let y = start[1] + (j as f64 + 0.5 - 2.7182818e-5) * size;
-            let mut heights = crossings(surface, x, y);
-            heights.sort_by(f64::total_cmp);
-            for k in 0..counts[2] {
-                let z = start[2] + (k as f64 + 0.5) * size;
-                inside[place([i, j, k])] = heights.iter().filter(|&&height| height < z).count() % 2 == 1;
+    // Off the middle by an irrational share, so that the line meets no edge of a regular surface.
+    let x = |i: usize| start[0] + (i as f64 + 0.5 + 1.1234567e-5) * size;
+    let y = |j: usize| start[1] + (j as f64 + 0.5 - 2.7182818e-5) * size;
+    // Every triangle is asked by the columns under its box alone, with one to spare for rounding.
+    let mut columns = vec![Vec::new(); counts[0] * counts[1]];
+    for &cell in &surface.cells {
+        let corners = surface.corners(cell);
+        let [across, along] = [0, 1].map(|axis| {
+            let ends = corners.map(|corner| (corner[axis] - start[axis]) / size);
+            let first = ends.into_iter().fold(f64::INFINITY, f64::min) - 1.5;
+            let last = ends.into_iter().fold(f64::NEG_INFINITY, f64::max) + 1.5;
+            (first.max(0.0) as usize)..(last.max(0.0) as usize).min(counts[axis])
+        });
+        for j in along {
+            for i in across.clone() {
+                columns[i + counts[0] * j].extend(crossing(corners, x(i), y(j)));
             }
+        }
+    }
+    for (column, heights) in columns.iter_mut().enumerate() {
+        heights.sort_by(f64::total_cmp);
+        for k in 0..counts[2] {
+            let z = start[2] + (k as f64 + 0.5) * size;
+            let below = heights.partition_point(|&height| height < z);
+            inside[column + counts[0] * counts[1] * k] = below % 2 == 1;
         }
     }
     if !inside.contains(&true) {
@@ -49,21 +63,14 @@ pub fn voxels(surface: &TriangleMesh, along: usize) -> Result<MixedMesh, String>
     Ok(mesh)
 }
 
-/// Heights at which the vertical line through (x, y) meets the surface.
-fn crossings(surface: &TriangleMesh, x: f64, y: f64) -> Vec<f64> {
-    let mut heights = Vec::new();
-    for &cell in &surface.cells {
-        let corners = surface.corners(cell);
-        let side = |a: [f64; 3], b: [f64; 3]| (b[0] - a[0]) * (y - a[1]) - (b[1] - a[1]) * (x - a[0]);
-        let [a, b, c] = corners;
-        let weights = [side(b, c), side(c, a), side(a, b)];
-        let sum: f64 = weights.iter().sum();
-        let same = weights.iter().all(|&w| w > 0.0) || weights.iter().all(|&w| w < 0.0);
-        if same && sum != 0.0 {
-            heights.push((weights[0] * a[2] + weights[1] * b[2] + weights[2] * c[2]) / sum);
-        }
-    }
-    heights
+/// The height at which the vertical line through (x, y) meets a triangle.
+fn crossing(corners: [[f64; 3]; 3], x: f64, y: f64) -> Option<f64> {
+    let side = |a: [f64; 3], b: [f64; 3]| (b[0] - a[0]) * (y - a[1]) - (b[1] - a[1]) * (x - a[0]);
+    let [a, b, c] = corners;
+    let weights = [side(b, c), side(c, a), side(a, b)];
+    let sum: f64 = weights.iter().sum();
+    let same = weights.iter().all(|&w| w > 0.0) || weights.iter().all(|&w| w < 0.0);
+    (same && sum != 0.0).then(|| (weights[0] * a[2] + weights[1] * b[2] + weights[2] * c[2]) / sum)
 }
 
 /// Fills around vertices where the cubes inside, or those outside, do not hang together by faces. True when it did.

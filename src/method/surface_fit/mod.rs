@@ -45,7 +45,7 @@ impl Method for SurfaceFit {
     }
 
     fn version(&self) -> u32 {
-        3
+        4
     }
 
     fn summary(&self) -> &'static str {
@@ -251,7 +251,9 @@ pub fn run(problem: &Problem, settings: &Settings, observer: &mut dyn Observer) 
     }
 
     observer.phase("measure");
-    let measured = outcome::measure(problem, settings, &samples, &fitted, parts, reached)?;
+    let measured = outcome::measure(problem, settings, &samples, &fitted, parts, reached, &|| {
+        observer.stop().is_some()
+    })?;
     notices.extend(measured.notices);
     let mut metrics = measured.metrics;
     metrics.insert("control_vertices".to_string(), control.points.len() as f64);

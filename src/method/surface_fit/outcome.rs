@@ -26,7 +26,7 @@ pub struct Measured {
     pub notices: Vec<String>,
 }
 
-/// Measures a fitted mesh in the solver's units.
+/// Measures a fitted mesh in the solver's units, unless `stop` says to give up.
 pub fn measure(
     problem: &Problem,
     settings: &Settings,
@@ -34,6 +34,7 @@ pub fn measure(
     fitted: &Surface,
     parts: Parts,
     stage: Stage,
+    stop: &dyn Fn() -> bool,
 ) -> Result<Measured, Failure> {
     let failure = |message: String| Failure {
         kind: "not-finite".to_string(),
@@ -45,7 +46,7 @@ pub fn measure(
     let hausdorff = if no_surface {
         to_points(&triangulated, &target.points)
     } else {
-        distance::hausdorff(&triangulated, target).map_err(failure)?
+        distance::hausdorff(&triangulated, target, stop).map_err(failure)?
     };
     let mut metrics = BTreeMap::new();
     let mut set = |name: &str, value: f64| {

@@ -14,7 +14,7 @@ use std::collections::BTreeMap;
 /// Intervals along an edge when distances are measured.
 const FINE: usize = 12;
 
-/// Distances and uniformity of the boundary.
+/// Distances and uniformity of the boundary, unless `stop` says to give up.
 pub fn measure_boundary(
     volume: &MixedMesh,
     topology: &Topology,
@@ -22,6 +22,7 @@ pub fn measure_boundary(
     x: &[f64],
     target: &Target,
     metrics: &mut BTreeMap<String, f64>,
+    stop: &dyn Fn() -> bool,
 ) -> Result<(), Failure> {
     let highest = space.orders.iter().copied().max().unwrap_or(1);
     let boundary = Boundary::new(volume, topology, space, FINE.max(2 * highest));
@@ -46,7 +47,7 @@ pub fn measure_boundary(
         set("hausdorff_to_target", f64::NAN);
         set("distance_rms", percent(square.sqrt()));
     } else {
-        let measured = distance::hausdorff(&fitted, clean).map_err(invalid)?;
+        let measured = distance::hausdorff(&fitted, clean, stop).map_err(invalid)?;
         set("hausdorff", measured.percent(measured.max()));
         set("hausdorff_to_target", measured.percent(measured.forward.max));
         set("hausdorff_from_target", measured.percent(measured.backward.max));

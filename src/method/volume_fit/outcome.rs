@@ -28,6 +28,7 @@ impl Fit<'_> {
             &self.x,
             &self.target,
             &mut metrics,
+            &|| observer.stop().is_some(),
         )?;
         for name in ["thickness_error_mean", "thickness_error_rms", "thickness_error_max"] {
             metrics.insert(name.to_string(), f64::NAN);

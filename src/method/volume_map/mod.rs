@@ -53,7 +53,7 @@ impl Method for VolumeMap {
     }
 
     fn version(&self) -> u32 {
-        4
+        5
     }
 
     fn summary(&self) -> &'static str {

@@ -288,6 +288,7 @@ fn every_experiment_that_ships_plans() {
         }
     }
     let mut count = 0;
+    let mut names = BTreeSet::new();
     for path in files {
         let text = fs::read_to_string(&path).expect("a file");
         // Printed figures are data of experiments.
@@ -296,6 +297,8 @@ fn every_experiment_that_ships_plans() {
         }
         let experiment =
             Experiment::parse(&path, &text, methods()).unwrap_or_else(|errors| panic!("{}", render(&errors, false)));
+        // All of them can be run by one command.
+        assert!(names.insert(experiment.name.clone()), "two files named {}", experiment.name);
         let claims = experiment.claims.clone();
         let plan =
             Plan::new(experiment, &Lookup::default()).unwrap_or_else(|errors| panic!("{}", render(&errors, false)));

@@ -298,7 +298,11 @@ fn every_experiment_that_ships_plans() {
         let experiment =
             Experiment::parse(&path, &text, methods()).unwrap_or_else(|errors| panic!("{}", render(&errors, false)));
         // All of them can be run by one command.
-        assert!(names.insert(experiment.name.clone()), "two files named {}", experiment.name);
+        assert!(
+            names.insert(experiment.name.clone()),
+            "two files named {}",
+            experiment.name
+        );
         let claims = experiment.claims.clone();
         let plan =
             Plan::new(experiment, &Lookup::default()).unwrap_or_else(|errors| panic!("{}", render(&errors, false)));

@@ -96,6 +96,17 @@ fn a_folder_of_experiments_is_one_command() {
     assert_eq!(run(&["report", "study", "-q"]).0, Some(0));
     assert_eq!(run(&["run", "study", "-q"]).0, Some(0));
 
+    // A file named twice is one experiment; a part of them leaves the overview as it is.
+    assert_eq!(
+        run(&["run", "study", "study/first.toml", "--only", "ball", "-q"]).0,
+        Some(0)
+    );
+    assert_eq!(std::fs::read_to_string(place("results/index.html")).unwrap(), overview);
+    // What is not stored is told by the exit code too.
+    std::fs::write(place("study/third.toml"), one.replace("stretch", "arap")).unwrap();
+    assert_eq!(run(&["report", "study", "-q"]).0, Some(4));
+    std::fs::remove_file(place("study/third.toml")).unwrap();
+
     // What is wrong with one file or between two is told before anything runs.
     std::fs::write(place("study/more/first.toml"), one.replace("stretch", "arap")).unwrap();
     let (code, _, errors) = run(&["run", "study", "--results", "new"]);
@@ -113,6 +124,18 @@ fn a_folder_of_experiments_is_one_command() {
         code == Some(3) && errors.contains("no experiment file in this folder"),
         "{errors}"
     );
+}
+
+#[test]
+fn readers_who_go_away_change_no_exit_code() {
+    let folder = folder();
+    let mut child = vargeo(folder.path(), &["run", "missing.toml"])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    drop((child.stdout.take(), child.stderr.take()));
+    assert_eq!(child.wait().unwrap().code(), Some(3));
 }
 
 #[test]

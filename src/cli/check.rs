@@ -42,7 +42,7 @@ pub fn execute(arguments: Arguments) -> Exit {
         && let Some(path) = &arguments.junit
         && let Err(error) = write_junit(path, &document)
     {
-        eprintln!("error: {error}");
+        tell!("error: {error}");
         return Exit::FileWrong;
     }
     exit
@@ -62,7 +62,7 @@ fn judge(plan: &Plan, done: &Done, written: &Written) -> Exit {
         } else {
             &verdict.subject
         };
-        eprintln!(
+        tell!(
             "{}.toml, {}: {}: expected {}, found {}",
             experiment.name,
             plain(&verdict.place),
@@ -79,7 +79,7 @@ fn judge(plan: &Plan, done: &Done, written: &Written) -> Exit {
             .count()
     };
     let met = count(Outcome::Met);
-    eprintln!(
+    tell!(
         "{}: {met} {} met, {} failed, {} skipped",
         experiment.name,
         if met == 1 { "expectation" } else { "expectations" },

@@ -35,7 +35,7 @@ pub fn execute(arguments: Arguments) -> Exit {
     let (left, right) = match sheets {
         Ok(sheets) => sheets,
         Err(error) => {
-            eprintln!("error: {error}");
+            tell!("error: {error}");
             return Exit::FileWrong;
         }
     };
@@ -45,7 +45,7 @@ pub fn execute(arguments: Arguments) -> Exit {
             sheet.head.iter().any(bare)
         };
         if !has(&left) || !has(&right) {
-            eprintln!("error: no column \"{column}\" in both; the first line of jobs.csv names them");
+            tell!("error: no column \"{column}\" in both; the first line of jobs.csv names them");
             return Exit::FileWrong;
         }
     }

@@ -23,24 +23,24 @@ pub fn execute(arguments: Arguments) -> Exit {
     let ((first_key, first), (second_key, second)) = match jobs {
         Ok(jobs) => jobs,
         Err(message) => {
-            eprintln!("error: {message}");
+            tell!("error: {message}");
             return Exit::FileWrong;
         }
     };
     let mut differences = Vec::new();
     compare(&first, &second, String::new(), &mut differences);
     match differences.split_first() {
-        None if first_key == second_key => println!("both are the job {first_key}"),
-        None => println!(
+        None if first_key == second_key => answer!("both are the job {first_key}"),
+        None => answer!(
             "the jobs are the same, and the keys are not: one of the records is damaged; run `vargeo store verify`"
         ),
         Some(((field, first, second), rest)) => {
-            println!("the jobs differ in {field}");
-            println!("  {}  {first}", short(&first_key));
-            println!("  {}  {second}", short(&second_key));
+            answer!("the jobs differ in {field}");
+            answer!("  {}  {first}", short(&first_key));
+            answer!("  {}  {second}", short(&second_key));
             if !rest.is_empty() {
                 let fields: Vec<&str> = rest.iter().map(|(field, _, _)| field.as_str()).collect();
-                println!("and in {}", fields.join(", "));
+                answer!("and in {}", fields.join(", "));
             }
         }
     }

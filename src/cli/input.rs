@@ -5,7 +5,8 @@ use crate::experiment::diagnostic::{Diagnostic, Severity, render};
 use crate::experiment::file::Experiment;
 use crate::experiment::plan::{Lookup, Plan};
 use crate::method;
-use std::io::IsTerminal;
+use std::collections::BTreeSet;
+use std::io::{IsTerminal, Write};
 use std::path::{Path, PathBuf};
 
 /// Experiment files and where their models are.
@@ -47,7 +48,7 @@ impl Input {
                     file.display(),
                     plan.experiment.name
                 );
-                wrong.push(Diagnostic::error(message).help("rename one of the files, or run them one after another"));
+                wrong.push(Diagnostic::error(message).help("rename one of the files"));
             }
         }
         if wrong.is_empty() {
@@ -74,6 +75,9 @@ impl Input {
                 return Err(fail(&[Diagnostic::error(message).help(help)]));
             }
         }
+        // A file that is named twice, itself and by its folder, is one experiment.
+        let mut seen = BTreeSet::new();
+        files.retain(|file| seen.insert(std::fs::canonicalize(file).unwrap_or_else(|_| file.clone())));
         Ok(files)
     }
 
@@ -112,7 +116,7 @@ fn find(folder: &Path, files: &mut Vec<PathBuf>) -> std::io::Result<()> {
 /// Prints diagnostics on standard error, in colour on a terminal.
 pub fn show(diagnostics: &[Diagnostic]) {
     let colour = std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty());
-    eprint!("{}", render(diagnostics, colour));
+    let _ = std::io::stderr().write_all(render(diagnostics, colour).as_bytes());
 }
 
 /// Prints diagnostics that keep a command from going on.
@@ -123,7 +127,7 @@ pub fn fail(diagnostics: &[Diagnostic]) -> Exit {
         .filter(|diagnostic| diagnostic.severity == Severity::Error)
         .count();
     if count > 1 {
-        eprintln!("{count} errors; nothing was run");
+        tell!("{count} errors; nothing was run");
     }
     Exit::FileWrong
 }

@@ -11,8 +11,8 @@ pub fn execute(_arguments: Arguments) -> Exit {
     if crate::run::job::serve(&crate::method::find) {
         Exit::Well
     } else {
-        eprintln!("error: standard input holds no job");
-        eprintln!("help: `vargeo run FILE` starts jobs");
+        tell!("error: standard input holds no job");
+        tell!("help: `vargeo run FILE` starts jobs");
         Exit::FileWrong
     }
 }

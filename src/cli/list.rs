@@ -82,7 +82,7 @@ pub fn execute(arguments: Arguments) -> Exit {
         .collect();
     if all.is_empty() {
         let names: Vec<&str> = methods().iter().map(|method| method.name()).collect();
-        eprintln!("error: no method has this name; there are {}", names.join(", "));
+        tell!("error: no method has this name; there are {}", names.join(", "));
         return Exit::FileWrong;
     }
     match arguments.list {

@@ -50,7 +50,7 @@ pub fn execute(arguments: Arguments) -> Exit {
     match outcome {
         Ok(exit) => exit,
         Err(message) => {
-            eprintln!("error: {message}");
+            tell!("error: {message}");
             Exit::FileWrong
         }
     }
@@ -75,7 +75,7 @@ fn convert(input: &Path, output: &Path, boundary: bool) -> Result<(), String> {
     }
     let written = format::write(format, &content).map_err(|message| format!("{name}: {message}"))?;
     for notice in content.notices.iter().chain(&written.notices) {
-        eprintln!("notice: {notice}");
+        tell!("notice: {notice}");
     }
     std::fs::write(output, &written.bytes).map_err(|error| format!("{name}: cannot be written: {error}"))
 }
@@ -156,7 +156,7 @@ fn inspect(path: &Path) -> Result<Exit, String> {
     }
     let width = rows.iter().map(|(label, _)| label.chars().count()).max().unwrap_or(0);
     for (label, value) in rows {
-        println!("{label:width$}  {value}");
+        answer!("{label:width$}  {value}");
     }
     for problem in &problems {
         let severity = match problem.severity {
@@ -164,10 +164,10 @@ fn inspect(path: &Path) -> Result<Exit, String> {
             Severity::Warning => "warning",
             Severity::Repaired => "repaired",
         };
-        println!("{severity:width$}  {}", problem.message);
+        answer!("{severity:width$}  {}", problem.message);
     }
     for notice in notices {
-        println!("{:width$}  {notice}", "notice");
+        answer!("{:width$}  {notice}", "notice");
     }
     let unsound = problems.iter().any(|problem| problem.severity == Severity::Error);
     Ok(if unsound { Exit::FileWrong } else { Exit::Well })

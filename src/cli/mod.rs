@@ -1,5 +1,19 @@
 //! The command line: one command a file, each with its arguments and its `execute`.
 
+/// Prints a line on standard error; a reader who has gone away is no reason to end.
+macro_rules! tell {
+    ($($part:tt)*) => {{
+        let _ = std::io::Write::write_fmt(&mut std::io::stderr(), format_args!("{}\n", format_args!($($part)*)));
+    }};
+}
+
+/// The same on standard output.
+macro_rules! answer {
+    ($($part:tt)*) => {{
+        let _ = std::io::Write::write_fmt(&mut std::io::stdout(), format_args!("{}\n", format_args!($($part)*)));
+    }};
+}
+
 mod explain;
 mod input;
 mod check;

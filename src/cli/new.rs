@@ -34,7 +34,7 @@ pub fn execute(arguments: Arguments) -> Exit {
     };
     match write(&file, &text) {
         Ok(()) => {
-            println!(
+            answer!(
                 "{} is written; see its jobs with `vargeo plan {}`",
                 file.display(),
                 file.display()

@@ -45,7 +45,7 @@ fn states(plan: &Plan, store: &Store) -> Vec<State> {
             (Some((_, resolved)), Lookup::Miss) if known_before(store, resolved) => State::Outdated,
             (_, Lookup::Miss) => State::ToRun,
             (_, Lookup::Damaged { reason, .. }) => {
-                eprintln!(
+                tell!(
                     "warning: the stored result of {} is damaged ({reason}); it will be computed again",
                     job.name
                 );

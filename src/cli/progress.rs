@@ -72,11 +72,11 @@ struct Quiet;
 impl Listener for Quiet {
     fn event(&mut self, event: &Event<'_>) {
         match event {
-            Event::Warning { text } => eprintln!("warning: {text}"),
+            Event::Warning { text } => tell!("warning: {text}"),
             Event::Finished { name, record, .. }
                 if matches!(record.result.status, Status::Failed | Status::Refused) =>
             {
-                eprintln!("error: {name}: {}: {}", record.result.stop, record.result.reason);
+                tell!("error: {name}: {}: {}", record.result.stop, record.result.reason);
             }
             _ => {}
         }
@@ -94,12 +94,12 @@ impl Listener for Lines {
     fn event(&mut self, event: &Event<'_>) {
         match event {
             Event::Planned { jobs, .. } => self.jobs = *jobs,
-            Event::Started { name, .. } => eprintln!("{name}: started"),
-            Event::Waiting { name, reason, .. } => eprintln!("{name}: waiting, {reason}"),
+            Event::Started { name, .. } => tell!("{name}: started"),
+            Event::Waiting { name, reason, .. } => tell!("{name}: waiting, {reason}"),
             Event::Repetition { name, repetition, .. } if *repetition > 0 => {
-                eprintln!("{name}: repetition {}", repetition + 1);
+                tell!("{name}: repetition {}", repetition + 1);
             }
-            Event::Phase { name, phase, .. } => eprintln!("{name}: {phase}"),
+            Event::Phase { name, phase, .. } => tell!("{name}: {phase}"),
             Event::Repetition { .. } | Event::Iterate { .. } => {}
             Event::Finished {
                 name, record, cached, ..
@@ -107,11 +107,11 @@ impl Listener for Lines {
                 self.done += 1;
                 // What was stored beforehand is counted, not listed.
                 if !cached || record.result.status != Status::Done {
-                    eprintln!("[{}/{}] {name}: {}", self.done, self.jobs, ending(record, *cached));
+                    tell!("[{}/{}] {name}: {}", self.done, self.jobs, ending(record, *cached));
                 }
             }
-            Event::Warning { text } => eprintln!("warning: {text}"),
-            Event::Interrupted { running } => eprintln!("{}", stopping(*running)),
+            Event::Warning { text } => tell!("warning: {text}"),
+            Event::Interrupted { running } => tell!("{}", stopping(*running)),
         }
     }
 }

@@ -5,6 +5,7 @@ use super::input::Input;
 use super::run;
 use crate::experiment::plan::Plan;
 use crate::experiment::record::Record;
+use crate::report::overview::Entry;
 use crate::run::Finished;
 use crate::run::pool::{effort, skipped};
 use crate::run::store::{Lookup, Store};
@@ -29,11 +30,28 @@ pub fn execute(arguments: Arguments) -> Exit {
         Ok(plans) => plans,
         Err(exit) => return exit,
     };
-    let exits: Vec<Exit> = plans.iter().map(|plan| report(plan, &arguments)).collect();
-    run::gravest(&exits)
+    let mut entries = Vec::new();
+    let mut exits = Vec::new();
+    for plan in &plans {
+        match report(plan, &arguments) {
+            Ok(entry) => entries.push(entry),
+            Err(exit) => exits.push(exit),
+        }
+    }
+    if plans.len() > 1
+        && !entries.is_empty()
+        && let Err(exit) = run::write_overview(&entries, &arguments.results, arguments.quiet)
+    {
+        exits.push(exit);
+    }
+    if exits.is_empty() {
+        Exit::Well
+    } else {
+        run::gravest(&exits)
+    }
 }
 
-fn report(plan: &Plan, arguments: &Arguments) -> Exit {
+fn report(plan: &Plan, arguments: &Arguments) -> Result<Entry, Exit> {
     let store = Store::new(arguments.results.join("store"));
     let effort = effort(plan, None);
     let mut finished = Vec::new();
@@ -45,7 +63,7 @@ fn report(plan: &Plan, arguments: &Arguments) -> Exit {
                 Lookup::Hit(record) => Some(*record),
                 Lookup::Miss => store.failure(key),
                 Lookup::Damaged { reason, .. } => {
-                    eprintln!(
+                    tell!(
                         "warning: the stored result of {} is damaged and left out: {reason}",
                         job.name
                     );
@@ -64,24 +82,22 @@ fn report(plan: &Plan, arguments: &Arguments) -> Exit {
     }
     let file = plan.experiment.name.as_str();
     if finished.iter().all(|finished| finished.record.key.0.is_empty()) {
-        eprintln!(
+        tell!(
             "error: no job of {file} is stored in {}\nhelp: `vargeo run` computes them",
             store.root().display()
         );
-        return Exit::NothingRan;
+        return Err(Exit::NothingRan);
     }
     if !absent.is_empty() {
-        eprintln!("warning: not stored and left out of the report: {}", absent.join(", "));
+        tell!("warning: not stored and left out of the report: {}", absent.join(", "));
     }
     let rows = run::rows(plan, &store, finished);
-    match run::write_report(
+    let written = run::write_report(
         &plan.experiment,
         &rows,
         plan.jobs.len(),
         &arguments.results,
         arguments.quiet,
-    ) {
-        Ok(_) => Exit::Well,
-        Err(exit) => exit,
-    }
+    )?;
+    Ok(Entry::new(&plan.experiment, &rows, plan.jobs.len(), &written.verdicts))
 }

@@ -108,18 +108,27 @@ pub(super) fn each(
             &written.verdicts,
         ));
     }
-    if plans.len() > 1 {
-        match overview::write(&entries, &running.results) {
-            Ok(_) if running.quiet => {}
-            Ok(page) => say(&format!(
-                "{}\noverview: {}",
-                overview::terminal(&entries),
-                page.display()
-            )),
-            Err(error) => exits.push(wrong(&error.to_string())),
-        }
+    // A part of the experiments is no overview of them.
+    if plans.len() > 1
+        && running.only.is_empty()
+        && let Err(exit) = write_overview(&entries, &running.results, running.quiet)
+    {
+        exits.push(exit);
     }
     gravest(&exits)
+}
+
+/// Writes `results/index.html` and prints a line for each experiment.
+pub(super) fn write_overview(entries: &[Entry], results: &Path, quiet: bool) -> Result<(), Exit> {
+    let page = overview::write(entries, results).map_err(|error| wrong(&error.to_string()))?;
+    if !quiet {
+        say(&format!(
+            "{}\noverview: {}",
+            overview::terminal(entries),
+            page.display()
+        ));
+    }
+    Ok(())
 }
 
 /// Nothing ran only where that is so of every experiment.
@@ -142,7 +151,7 @@ fn run(plan: &Plan, running: &Running, chosen: Option<Vec<usize>>, interrupt: &I
     let store = Store::new(running.results.join("store"));
     if !running.quiet {
         say(&format!("{}: {} jobs", plan.experiment.title, plan.jobs.len()));
-        plan.notices.iter().for_each(|notice| eprintln!("notice: {notice}"));
+        plan.notices.iter().for_each(|notice| tell!("notice: {notice}"));
     }
     let options = Options {
         store: store.clone(),
@@ -164,9 +173,7 @@ fn run(plan: &Plan, running: &Running, chosen: Option<Vec<usize>>, interrupt: &I
         let skipped = |finished: &&Finished| finished.record.result.status == Status::Skipped;
         let kept = outcome.finished.len() - outcome.finished.iter().filter(skipped).count();
         let jobs = plan.jobs.len();
-        eprintln!(
-            "interrupted: {kept} of {jobs} jobs are finished and kept; the same command computes the other {left}"
-        );
+        tell!("interrupted: {kept} of {jobs} jobs are finished and kept; the same command computes the other {left}");
         return Ok(Done {
             exit: Exit::Interrupted,
             rows: Vec::new(),
@@ -227,7 +234,7 @@ fn choose(plan: &Plan, only: &[String], others: bool) -> Result<Option<Vec<usize
 }
 
 fn wrong(message: &str) -> Exit {
-    eprintln!("error: {message}");
+    tell!("error: {message}");
     Exit::FileWrong
 }
 
@@ -244,8 +251,8 @@ fn repeat_warnings(outcome: &Run) {
         .filter(|warning| warning.contains("not deterministic"))
         .collect();
     if !grave.is_empty() {
-        eprintln!("warning: {} jobs are NOT DETERMINISTIC:", grave.len());
-        grave.iter().for_each(|warning| eprintln!("  {warning}"));
+        tell!("warning: {} jobs are NOT DETERMINISTIC:", grave.len());
+        grave.iter().for_each(|warning| tell!("  {warning}"));
     }
 }
 
@@ -335,7 +342,7 @@ fn tell_overwritten(experiment: &Experiment, folder: &Path) {
         && before != file
         && before.exists()
     {
-        eprintln!(
+        tell!(
             "warning: {} held the report of {}, which is overwritten; its results stay in the store\nhelp: rename one of \
              the two files, or give each a --results folder of its own",
             folder.display(),

@@ -59,7 +59,7 @@ pub fn execute(arguments: Arguments) -> Exit {
         Action::Gc(tidy) => collect(&tidy),
     };
     done.unwrap_or_else(|error| {
-        eprintln!("error: {error}");
+        tell!("error: {error}");
         Exit::FileWrong
     })
 }
@@ -80,12 +80,12 @@ fn open(place: &Place) -> Result<Store, String> {
 
 fn verify(place: &Place) -> Done {
     let (sound, damaged) = open(place)?.verify()?;
-    println!("{sound} results are sound, {} are damaged", damaged.len());
+    answer!("{sound} results are sound, {} are damaged", damaged.len());
     for damage in &damaged {
-        println!("{}: {}", damage.key.0, damage.reason);
+        answer!("{}: {}", damage.key.0, damage.reason);
         match &damage.quarantine {
-            Ok(path) => println!("  moved to {}; the next run computes it again", path.display()),
-            Err(error) => println!("  {error}"),
+            Ok(path) => answer!("  moved to {}; the next run computes it again", path.display()),
+            Err(error) => answer!("  {error}"),
         }
     }
     Ok(if damaged.is_empty() {
@@ -97,17 +97,17 @@ fn verify(place: &Place) -> Done {
 
 fn statistics(place: &Place) -> Done {
     let statistics = open(place)?.statistics()?;
-    println!("{} results, {}", statistics.entries, HumanBytes(statistics.bytes));
+    answer!("{} results, {}", statistics.entries, HumanBytes(statistics.bytes));
     for (kind, count) in &statistics.kinds {
-        println!("  {count} {kind}");
+        answer!("  {count} {kind}");
     }
-    println!("{} failures, tried again by the next run", statistics.failures);
-    println!(
+    answer!("{} failures, tried again by the next run", statistics.failures);
+    answer!(
         "{} in quarantine, {}",
         statistics.quarantined,
         HumanBytes(statistics.quarantined_bytes)
     );
-    println!(
+    answer!(
         "{} unfinished, {}",
         statistics.leftovers,
         HumanBytes(statistics.leftover_bytes)
@@ -128,7 +128,7 @@ fn collect(tidy: &Tidy) -> Done {
     let garbage = store.garbage(age, keep.as_ref())?;
     let mut sums: BTreeMap<GarbageKind, (usize, u64)> = BTreeMap::new();
     for Garbage { kind, path, bytes } in &garbage {
-        println!("{}", path.display());
+        answer!("{}", path.display());
         let sum = sums.entry(*kind).or_default();
         *sum = (sum.0 + 1, sum.1 + bytes);
     }
@@ -140,15 +140,15 @@ fn collect(tidy: &Tidy) -> Done {
             GarbageKind::Failure => "failures of no given experiment",
             GarbageKind::Lock => "idle locks",
         };
-        println!("{count} {word}, {}", HumanBytes(bytes));
+        answer!("{count} {word}, {}", HumanBytes(bytes));
     }
     match (garbage.is_empty(), tidy.delete) {
-        (true, _) => println!("nothing to remove"),
+        (true, _) => answer!("nothing to remove"),
         (false, true) => {
             store.remove(&garbage)?;
-            println!("removed");
+            answer!("removed");
         }
-        (false, false) => println!("nothing was removed; --delete does it"),
+        (false, false) => answer!("nothing was removed; --delete does it"),
     }
     Ok(Exit::Well)
 }
@@ -166,11 +166,11 @@ fn keys(tidy: &Tidy) -> Result<BTreeSet<Key>, Exit> {
                 (Some((key, _)), _) => keys.extend([key]),
                 (None, missing) => {
                     let reason = missing.unwrap_or_default();
-                    eprintln!(
+                    tell!(
                         "error: {}: which results to keep is not known ({reason})",
                         file.display()
                     );
-                    eprintln!("help: name the folder of its models with --models");
+                    tell!("help: name the folder of its models with --models");
                     return Err(Exit::FileWrong);
                 }
             }

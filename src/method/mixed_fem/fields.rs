@@ -163,9 +163,9 @@ pub static FIELDS: &[Field] = &[
         kind: Kind::List(&Kind::Table(HANDLE)),
         default: Default::Absent,
         doc: "Which vertices are fixed, moved or free; a later handle wins. Vertices that no handle selects are free. \
-              Without handles a generated mesh brings its own, and a file is fixed at its boundary. To edit a surface set \
-              data = \"position\" and handles such as [{ select = \"boundary\", rings = 2 }, { select = \"nearest\", \
-              center = [0, 0, 0], role = \"moved\", translate = [0, 0, 0.5] }].",
+              Without handles a generated mesh brings its own, and a file is fixed at its boundary. To edit a surface give \
+              the data \"position\", a handle that holds the boundary with two rings, and one of the role \"moved\" with \
+              a center, a radius and a translation; experiments/mixed-fem/editing.toml does so.",
     },
     Field {
         name: "tangents",

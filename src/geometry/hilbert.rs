@@ -4,6 +4,7 @@
 //! point's index beside its position in one 64-bit key: 2^16 cells an axis for ten thousand points, 2^14 for a million.
 //! Crowded cells have curves of their own.
 
+use crate::mesh::bounding_box;
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -69,19 +70,14 @@ pub fn place(point: [f64; 3]) -> [u64; 3] {
 /// finite may come anywhere.
 pub fn order(points: &[[f64; 3]], keys: &mut Vec<u64>, order: &mut Vec<u32>) -> bool {
     let shared_work = points.len() >= MANY && rayon::current_num_threads() > 1;
-    let (low, high) = if shared_work {
-        (points.par_chunks(MANY).map(bounds)).reduce(
-            || bounds(&[]),
-            |(low, high), (other_low, other_high)| {
-                (
-                    std::array::from_fn(|axis| low[axis].min(other_low[axis])),
-                    std::array::from_fn(|axis| high[axis].max(other_high[axis])),
-                )
-            },
-        )
+    let corners = if shared_work {
+        // The box of the boxes of the parts.
+        let boxes: Vec<[[f64; 3]; 2]> = points.par_chunks(MANY).filter_map(bounding_box).collect();
+        bounding_box(boxes.as_flattened())
     } else {
-        bounds(points)
+        bounding_box(points)
     };
+    let [low, high] = corners.unwrap_or([[0.0; 3]; 2]);
     let index_bits = u32::BITS - (points.len().saturating_sub(1) as u32).leading_zeros();
     let bits = BITS.min((u64::BITS - index_bits) / 3);
     let mask = (1u32 << bits) - 1;
@@ -145,19 +141,6 @@ pub fn order(points: &[[f64; 3]], keys: &mut Vec<u64>, order: &mut Vec<u32>) -> 
         start = end;
     }
     shared
-}
-
-/// The corners of the box around points; the empty box without any.
-fn bounds(points: &[[f64; 3]]) -> ([f64; 3], [f64; 3]) {
-    let mut low = [f64::INFINITY; 3];
-    let mut high = [f64::NEG_INFINITY; 3];
-    for point in points {
-        for axis in 0..3 {
-            low[axis] = low[axis].min(point[axis]);
-            high[axis] = high[axis].max(point[axis]);
-        }
-    }
-    (low, high)
 }
 
 /// Puts the points of one cell of the grid in order.

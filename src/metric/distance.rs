@@ -139,8 +139,8 @@ impl Hausdorff {
     }
 }
 
-/// Distances between two surfaces, each against the other's tree, sampled relative to the second one's diagonal. `stop` is
-/// asked every fraction of a second whether to give up.
+/// Distances between two surfaces, each against the other's tree, sampled relative to the second one's diagonal.
+/// `stop` is asked every fraction of a second whether to give up.
 ///
 /// # Errors
 /// For a surface without triangles, for a second surface of size zero, and when `stop` says so.

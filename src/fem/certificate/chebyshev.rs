@@ -7,8 +7,9 @@
 //! bounds the distance to the polynomials of that degree.
 //!
 //! The kernels of sines need a bound for complex arguments: with `x = (1 + s) / 2`,
-//! `kappa(s) = sqrt(2) sin(a x) / (a x (1 - x))`; as `|sin(z) / z| <= cosh(Im z)`, and as the same holds from the other end,
-//! `|kappa(s)| <= 2 sqrt(2) cosh(a Im x)`; the derivative by Cauchy's formula on a circle of radius `2 / a`.
+//! `kappa(s) = sqrt(2) sin(a x) / (a x (1 - x))`; as `|sin(z) / z| <= cosh(Im z)`, and as the same holds from the
+//! other end, `|kappa(s)| <= 2 sqrt(2) cosh(a Im x)`; the derivative by Cauchy's formula on a circle of radius
+//! `2 / a`.
 
 use super::bernstein::Conversion;
 use crate::fem::basis::Basis;

@@ -1,4 +1,4 @@
-//! Hexahedra: products of line functions on boxes.
+//! Hexahedra whose functions are not all polynomials: products of line functions, interpolated on boxes.
 
 use super::{Certifier, NEGATIVE, Verdict, apply_right, determinant};
 use crate::fem::functions::line_table;

@@ -2,11 +2,11 @@
 //!
 //! On a box, prism or tetrahedron within the cell the Jacobian is a convex combination of control matrices, its Bernstein
 //! coefficients. With any fixed matrix `J0`, `det J > 0` follows when the symmetric parts of all control matrices of
-//! `J0^-1 J`, or of all of `J J0^-1`, are positive definite: positive definite matrices are a convex set, and `det M >= det((M + M^T) / 2)`
-//! (Ostrowski and Taussky 1951). As the cube root of the determinant is concave there, the least of their determinants
-//! times `det J0` bounds `det J` from below. No product of polynomials is needed, unlike for Bernstein coefficients of
-//! the determinant itself (Johnen et al. 2013). Where the test fails the part is cut, until it holds, a point with a
-//! negative determinant turns up, or the permitted number of parts is used up.
+//! `J0^-1 J`, or of all of `J J0^-1`, are positive definite: positive definite matrices are a convex set, and
+//! `det M >= det((M + M^T) / 2)` (Ostrowski and Taussky 1951). As the cube root of the determinant is concave there,
+//! the least of their determinants times `det J0` bounds `det J` from below. No product of polynomials is needed, unlike
+//! for Bernstein coefficients of the determinant itself (Johnen et al. 2013). Where the test fails the part is cut,
+//! until it holds, a point with a negative determinant turns up, or the permitted number of parts is used up.
 //!
 //! Functions that are no polynomials are replaced on each part by interpolants, along lines at Chebyshev points, on
 //! triangles and tetrahedra at lattices, with an explicit bound on the error ([`chebyshev`]) that is subtracted from the
@@ -20,6 +20,7 @@ mod bernstein;
 mod chebyshev;
 mod interval;
 mod lattice;
+mod position;
 mod polynomial;
 mod hexahedron;
 mod prism;
@@ -35,7 +36,7 @@ use bernstein::{Conversion, line_conversion, tetrahedron_conversion, triangle_co
 use interval::Interval;
 use lattice::Lattice;
 use nalgebra::DMatrix;
-use polynomial::{Converted, prism_last};
+use position::{Converted, prism_last};
 use std::collections::BTreeMap;
 
 /// What could be shown of a cell.
@@ -269,7 +270,7 @@ impl Certifier {
         }
         let mean = mean.map(|column| times(column, 1.0 / control.len() as f64));
         let error = error * frobenius(inverse);
-        prove(control, &mean, error).ok_or_else(|| rough(control, &mean, error))
+        prove(control, &mean, error).ok_or_else(|| rough(control.iter().copied(), &mean, error))
     }
 }
 
@@ -318,13 +319,11 @@ fn prove(control: &[Columns<f64>], mean: &Columns<f64>, error: f64) -> Option<f6
 }
 
 /// `det (J0 + D) >= det J0 - (prod (|c_i| + |d_i|) - prod |c_i|)` over all those combinations, by Hadamard's inequality.
-fn rough(control: &[Columns<f64>], mean: &Columns<f64>, error: f64) -> f64 {
+fn rough(control: impl Iterator<Item = Columns<f64>> + Clone, mean: &Columns<f64>, error: f64) -> f64 {
     let size = |column: [f64; 3]| dot(column, column).sqrt();
     let (mut inner, mut outer) = (1.0, 1.0);
     for direction in 0..3 {
-        let away = control
-            .iter()
-            .map(|matrix| size(subtract(matrix[direction], mean[direction])));
+        let away = (control.clone()).map(|matrix| size(subtract(matrix[direction], mean[direction])));
         let length = size(mean[direction]);
         inner *= length;
         outer *= length + away.fold(0.0, f64::max) + error;

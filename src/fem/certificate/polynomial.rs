@@ -5,17 +5,16 @@
 //! to degree p again so that all three derivatives together make control matrices. Where the proof fails the part is cut
 //! in the middle of the longest edge of the simplex along which the control matrices differ most, by de Casteljau's
 //! algorithm: averages only, so a rounding error stays what it is but for half a unit in the last place a step. Against
-//! derivatives by the part's own coordinates, which halve with every cut, it grows; a part of a hexahedron where it matters
-//! is computed anew.
+//! derivatives by the part's own coordinates, which halve with every cut, it grows; a part of a hexahedron where it
+//! matters is computed anew.
 
 use super::lattice::Lattice;
-use super::{Certifier, NEGATIVE, Verdict, determinant, frobenius, rounding};
+use super::{Certifier, NEGATIVE, Verdict, determinant, frobenius, rough};
 use crate::fem::space::Kind;
 use crate::linalg::lanes::{Lanes, Vector, WIDTH};
 use crate::linalg::processor::{Kernel, Processor};
 use crate::linalg::vector3::{Columns, add, cofactor, dot, subtract, times};
 use crate::mesh::mixed::Shape;
-use nalgebra::DMatrix;
 
 /// Cuts of a part at most.
 const MOST_CUTS: i32 = 60;
@@ -28,27 +27,6 @@ const PRECISE: f64 = 0.01;
 
 /// Half a unit in the last place of 1.
 const UNIT: f64 = 0.5 * f64::EPSILON;
-
-/// The functions of a triangle or tetrahedron in Bernstein form: a row a coefficient, a column a function.
-#[derive(Clone, Debug)]
-pub(super) struct Converted {
-    pub(super) matrix: DMatrix<f64>,
-    /// For each function a bound of the error of its coefficients.
-    pub(super) errors: Vec<f64>,
-}
-
-impl Converted {
-    /// From values at the points of a conversion, entry `functions * point + function`.
-    pub(super) fn new(conversion: &DMatrix<f64>, norm: f64, functions: usize, values: &[f64]) -> Converted {
-        let sampled = DMatrix::from_row_slice(conversion.ncols(), functions, values);
-        let sizes = sampled.column_iter().map(|column| column.amax());
-        let errors = sizes.map(|size| rounding(norm) * size).collect();
-        Converted {
-            matrix: conversion * sampled,
-            errors,
-        }
-    }
-}
 
 /// A factor of a cell with its place among the indices of the coefficients.
 struct Factor<'a> {
@@ -176,93 +154,6 @@ impl Certifier {
         }
         Verdict::Positive(bound)
     }
-
-    /// The coefficients with the origin in the middle of the vertices, where they are small.
-    fn centred(&self, kind: Kind, coefficients: &[[f64; 3]]) -> Vec<[f64; 3]> {
-        let n = kind.order + 1;
-        // The functions of the vertices, which add up to 1.
-        let vertices: Vec<usize> = match kind.shape {
-            Shape::Hexahedron => (0..8)
-                .map(|place| ((place >> 2) * n + (place >> 1 & 1)) * n + (place & 1))
-                .collect(),
-            Shape::Prism => {
-                let functions = coefficients.len() / n;
-                (0..2)
-                    .flat_map(|level| (0..3).map(move |corner| level * functions + corner))
-                    .collect()
-            }
-            Shape::Tetrahedron => (0..4).collect(),
-        };
-        let sum = vertices
-            .iter()
-            .fold([0.0; 3], |sum, &vertex| add(sum, coefficients[vertex]));
-        let middle = times(sum, 1.0 / vertices.len() as f64);
-        let mut own = coefficients.to_vec();
-        for vertex in vertices {
-            own[vertex] = subtract(own[vertex], middle);
-        }
-        own
-    }
-
-    /// The coefficients of the position by component, and a bound of their error: on the box of these intervals, each a
-    /// level and a number, for hexahedra, on the whole cell for others.
-    fn positions(&self, kind: Kind, own: &[[f64; 3]], box_of: [(u32, u32); 3]) -> (Vec<f64>, f64) {
-        let n = kind.order + 1;
-        // Rounding in the sums, relative to the sizes of the terms.
-        const SUMS: f64 = 1e-14;
-        let mut error = [0.0; 3];
-        let mut term = |c: [f64; 3], size: f64, wrong: f64| {
-            for (error, c) in error.iter_mut().zip(c) {
-                *error += c.abs() * (wrong + SUMS * size);
-            }
-        };
-        let list: Vec<[f64; 3]> = match kind.shape {
-            Shape::Hexahedron => {
-                let lines = box_of.map(|(level, index)| self.interval(kind.order, level, index));
-                for (place, &c) in own.iter().enumerate() {
-                    let functions = [place / (n * n), place / n % n, place % n];
-                    let (mut high, mut low) = (1.0, 1.0);
-                    for (line, function) in lines.iter().zip(functions) {
-                        high *= line.value_sizes[function];
-                        low *= line.value_sizes[function] - line.value_errors[function];
-                    }
-                    term(c, high, high - low);
-                }
-                let last = contract(own, n * n, &lines[2].values, n, 1);
-                let second = contract(&last, n, &lines[1].values, n, n);
-                contract(&second, 1, &lines[0].values, n, n * n)
-            }
-            Shape::Prism => {
-                let line = self.interval(kind.order, 0, 0);
-                let functions = own.len() / n;
-                let mut levels = Vec::with_capacity(own.len());
-                for (level, own) in own.chunks_exact(functions).enumerate() {
-                    let triangle = &self.triangle_functions[&(kind.order, prism_last(kind, level))];
-                    levels.extend(products(&triangle.matrix, own));
-                    for (function, &c) in own.iter().enumerate() {
-                        let (most, wrong) = (triangle.matrix.column(function).amax(), triangle.errors[function]);
-                        let high = (most + wrong) * line.value_sizes[level];
-                        let low = most * (line.value_sizes[level] - line.value_errors[level]);
-                        term(c, high, high - low);
-                    }
-                }
-                let across = levels.len() / n;
-                contract(&levels, 1, &line.values, n, across)
-            }
-            Shape::Tetrahedron => {
-                let converted = &self.tetrahedron_functions[&kind.order];
-                for (function, &c) in own.iter().enumerate() {
-                    let wrong = converted.errors[function];
-                    term(c, converted.matrix.column(function).amax() + wrong, wrong);
-                }
-                products(&converted.matrix, own)
-            }
-        };
-        let positions = (0..3)
-            .flat_map(|axis| list.iter().map(move |point| point[axis]))
-            .collect();
-        (positions, error.into_iter().fold(0.0, f64::max))
-    }
 }
 
 /// Level and number of the intervals whose product a hexahedron's part is.
@@ -273,40 +164,6 @@ fn intervals(part: &Part) -> [(u32, u32); 3] {
         let share = 1.0 / (high - low);
         (share.log2().round() as u32, (low * share) as u32)
     })
-}
-
-/// The triangle functions of a level of line functions: bottom, top and within may differ.
-pub(super) fn prism_last(kind: Kind, level: usize) -> usize {
-    [kind.last[0], kind.last[1], 2][level.min(2)]
-}
-
-/// `sum_f matrix[row][f] c[f]` for every row.
-fn products(matrix: &DMatrix<f64>, c: &[[f64; 3]]) -> Vec<[f64; 3]> {
-    let mut result = vec![[0.0; 3]; matrix.nrows()];
-    for (column, &c) in matrix.column_iter().zip(c) {
-        for (sum, &weight) in result.iter_mut().zip(column.iter()) {
-            *sum = add(*sum, times(c, weight));
-        }
-    }
-    result
-}
-
-/// `sum_f input[o][f][i] weights[n f + row]` at `[o][row][i]`, where f and row run below n.
-fn contract(input: &[[f64; 3]], outer: usize, weights: &[f64], n: usize, inner: usize) -> Vec<[f64; 3]> {
-    let mut result = vec![[0.0; 3]; input.len()];
-    for o in 0..outer {
-        for f in 0..n {
-            let from = &input[(o * n + f) * inner..(o * n + f + 1) * inner];
-            for row in 0..n {
-                let weight = weights[f * n + row];
-                let to = &mut result[(o * n + row) * inner..(o * n + row + 1) * inner];
-                for (sum, &value) in to.iter_mut().zip(from) {
-                    *sum = add(*sum, times(value, weight));
-                }
-            }
-        }
-    }
-    result
 }
 
 impl Cell<'_> {
@@ -371,8 +228,8 @@ impl Cell<'_> {
             [0, 1, 2].map(|row| [0, 1, 2].map(|column| if row == column { 1.0 / size } else { 0.0 }))
         };
         let delta = frobenius(&rows) * self.error(part);
-        // Turned and bent shapes, flat ones too, are near J0 from the one side, uneven parameters from the other. The edge to
-        // cut is chosen by the second.
+        // Turned and bent shapes, flat ones too, are near J0 from the one side, uneven parameters from the other. The
+        // edge to cut is chosen by the second.
         for from_left in [true, false] {
             let mut least = f64::INFINITY;
             let mut holds = true;
@@ -418,22 +275,17 @@ impl Cell<'_> {
         worst.map(|(point, _)| point)
     }
 
-    /// `det (J0 + D) >= det J0 - (prod (|c_i| + |d_i|) - prod |c_i|)` over all combinations, by Hadamard's inequality.
+    /// A lower bound of the determinant from the control matrices as they are.
     fn rough(&self, part: &Part) -> f64 {
-        let mean = self.mean();
-        let size = |column: [f64; 3]| dot(column, column).sqrt();
-        let (mut inner, mut outer) = (1.0, 1.0);
-        for direction in 0..3 {
-            let away = (0..self.points).map(|point| size(subtract(self.matrix(point)[direction], mean[direction])));
-            let length = size(mean[direction]);
-            inner *= length;
-            outer *= length + away.fold(0.0, f64::max) + self.error(part);
-        }
-        (determinant(&mean) - (outer - inner)).min(0.0)
+        rough(
+            (0..self.points).map(|point| self.matrix(point)),
+            &self.mean(),
+            self.error(part),
+        )
     }
 
-    /// The factor along which the symmetric parts change most, where ends and middles of rows are compared, and its longest
-    /// edge: that of the greatest change would make needles, whose thickness is lost in rounding.
+    /// The factor along which the symmetric parts change most, where ends and middles of rows are compared, and its
+    /// longest edge: that of the greatest change would make needles, whose thickness is lost in rounding.
     fn longest(&self, part: &Part) -> (usize, usize) {
         let mut best = (0, 0, f64::NEG_INFINITY);
         for (index, (factor, corners)) in self.factors.iter().zip(&part.corners).enumerate() {
@@ -602,8 +454,8 @@ impl Kernel for Halves<'_> {
     }
 }
 
-/// Whether the symmetric parts of `rows J`, or else of `J rows`, less `delta` on their diagonals, are all positive definite,
-/// and the least of their determinants.
+/// Whether the symmetric parts of `rows J`, or else of `J rows`, less `delta` on their diagonals, are all positive
+/// definite, and the least of their determinants.
 struct Test<'a> {
     control: &'a [f64],
     stride: usize,

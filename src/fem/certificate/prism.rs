@@ -1,18 +1,18 @@
-//! Prisms: triangle functions times line functions, on smaller prisms.
+//! Prisms whose functions are not all polynomials: triangle functions times line functions, interpolated on smaller
+//! prisms.
 
 use super::bernstein::{in_triangle, row_norm, triangle_children};
 use super::chebyshev::{Interpolated, triangle_errors};
 use super::{Certifier, NEGATIVE, Verdict, accumulate, apply_right, determinant, frobenius, rounding};
 use crate::fem::functions::{Table, line_table, triangle_table};
 use crate::fem::space::Kind;
-use crate::linalg::vector3::{Columns, add, dot, times};
+use crate::linalg::vector3::{Columns, add, times};
 
 impl Certifier {
     pub(super) fn prism(&self, kind: Kind, coefficients: &[[f64; 3]], inverse: &Columns<f64>) -> Verdict {
         let order = kind.order;
         let most = self.most(kind);
         let degree = self.degree(order);
-        let exact = self.polynomial(order);
         let (line_points, line_convert) = &self.lines[&degree];
         let conversion = &self.triangles[&degree];
         let (m, t) = (line_points.len(), conversion.points.len());
@@ -95,10 +95,7 @@ impl Certifier {
                 }
             }
             let size = frobenius(&columns);
-            let mut error = rounding(norm) * size;
-            if !exact {
-                error += self.prism_error(order, lasts, &corners, (level, index), coefficients);
-            }
+            let error = rounding(norm) * size + self.prism_error(order, lasts, &corners, (level, index), coefficients);
             // Along the line, then over the triangle.
             let mut along = vec![[[0.0; 3]; 3]; t * m];
             for row in 0..m {
@@ -165,12 +162,10 @@ impl Certifier {
                     triangle.size * line.slope_errors[level] + line.slope_sizes[level] * triangle.error,
                 ];
                 for (column, error) in columns.iter_mut().zip(errors) {
-                    for axis in 0..3 {
-                        column[axis] += c[axis].abs() * error;
-                    }
+                    *column = add(*column, times(c.map(f64::abs), error));
                 }
             }
         }
-        columns.iter().map(|column| dot(*column, *column)).sum::<f64>().sqrt()
+        frobenius(&columns)
     }
 }

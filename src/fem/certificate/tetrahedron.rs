@@ -1,18 +1,17 @@
-//! Tetrahedra, cut into smaller ones.
+//! Tetrahedra whose functions are not all polynomials, interpolated on smaller ones.
 
 use super::bernstein::{in_tetrahedron, tetrahedron_children};
 use super::chebyshev::tetrahedron_errors;
 use super::{Certifier, NEGATIVE, Verdict, accumulate, apply_right, determinant, frobenius, rounding};
 use crate::fem::functions::tetrahedron_table;
 use crate::fem::space::Kind;
-use crate::linalg::vector3::{Columns, add, dot, times};
+use crate::linalg::vector3::{Columns, add, times};
 
 impl Certifier {
     pub(super) fn tetrahedron(&self, kind: Kind, coefficients: &[[f64; 3]], inverse: &Columns<f64>) -> Verdict {
         let order = kind.order;
         let most = self.most(kind);
         let degree = self.degree(order);
-        let exact = self.polynomial(order);
         let conversion = &self.tetrahedra[&degree];
         let t = conversion.points.len();
         let whole = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
@@ -56,19 +55,14 @@ impl Certifier {
                     *column = add(*column, times(c.map(f64::abs), slopes.fold(0.0, f64::max)));
                 }
             }
-            let mut error = rounding(conversion.norm) * frobenius(&columns);
-            if !exact {
-                let mut columns = [[0.0; 3]; 3];
-                let errors = tetrahedron_errors(self.basis, order, &corners, degree, conversion);
-                for (c, function) in coefficients.iter().zip(errors) {
-                    for (column, error) in columns.iter_mut().zip(function.slope_errors) {
-                        for axis in 0..3 {
-                            column[axis] += c[axis].abs() * error;
-                        }
-                    }
+            let mut wrong = [[0.0; 3]; 3];
+            let errors = tetrahedron_errors(self.basis, order, &corners, degree, conversion);
+            for (c, function) in coefficients.iter().zip(errors) {
+                for (column, error) in wrong.iter_mut().zip(function.slope_errors) {
+                    *column = add(*column, times(c.map(f64::abs), error));
                 }
-                error += columns.iter().map(|column| dot(*column, *column)).sum::<f64>().sqrt();
             }
+            let error = rounding(conversion.norm) * frobenius(&columns) + frobenius(&wrong);
             match self.part(&mut control, error, inverse) {
                 Ok(least) => bound = bound.min(least),
                 Err(rough) if parts + stack.len() + 8 > most || level > 20 => {

@@ -21,9 +21,9 @@
 //! comes out with noise of size `1/h` and more, and a little of it is mixed into the smooth part: the error of `u` falls
 //! as `h^2` to some 192 cells a unit length on Delaunay meshes with random vertices and more slowly beyond. `S = c h^3
 //! s^2 / 100 K` with the stiffness `K` of the boundary curves damps rough `w` by `h` and takes `O(h^3)` away from smooth
-//! `w`. The noise is gone from `u`, which converges as `h^2` on every mesh as fine as was tried. Here `s^2` is the area of
-//! the connected part of the domain and `h` its mean edge length. `K` is not diagonal: `w` cannot be eliminated with
-//! sparse matrices, and there is no one-field system.
+//! `w`. The noise is gone from `u`, which converges as `h^2` on every mesh as fine as was tried. Here `s^2` is the
+//! area of the connected part of the domain and `h` its mean edge length. `K` is not diagonal: `w` cannot be
+//! eliminated with sparse matrices, and there is no one-field system.
 
 use super::domain::{Domain, Place};
 use crate::fem::surface::SurfaceOperators;

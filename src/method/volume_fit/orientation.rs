@@ -10,7 +10,8 @@ use super::target::Closure;
 use crate::mesh::{self, TriangleMesh};
 use std::collections::BTreeMap;
 
-/// Turns what faces the wrong way where some edges have triangles of opposite orientations; the number of triangles turned.
+/// Turns what faces the wrong way where some edges have triangles of opposite orientations; the number of triangles
+/// turned.
 pub fn orient(surface: &mut TriangleMesh) -> usize {
     let closure = Closure::of(surface);
     if closure.open > 0 || closure.turned == 0 {

@@ -5,6 +5,7 @@
 //! neighbours are small. Byte planes are stored one after the other, which deflate likes. Exact figures are in the VTU
 //! file.
 
+use crate::mesh::bounding_box;
 use crate::report::picture::colour::Scale;
 use crate::report::picture::solid::Solid;
 use base64::Engine;
@@ -54,19 +55,7 @@ fn deflate(bytes: &[u8]) -> String {
 }
 
 fn bounds(points: &[[f64; 3]]) -> [[f64; 3]; 2] {
-    let mut low = [f64::INFINITY; 3];
-    let mut high = [f64::NEG_INFINITY; 3];
-    for point in points {
-        for axis in 0..3 {
-            low[axis] = low[axis].min(point[axis]);
-            high[axis] = high[axis].max(point[axis]);
-        }
-    }
-    if points.is_empty() {
-        [[0.0; 3], [1.0; 3]]
-    } else {
-        [low, high]
-    }
+    bounding_box(points).unwrap_or([[0.0; 3], [1.0; 3]])
 }
 
 /// A coordinate between the bounds as a whole number up to `levels`.

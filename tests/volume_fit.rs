@@ -90,6 +90,34 @@ fn an_inverted_mesh_is_repaired_over_its_own_boundary() {
 }
 
 #[test]
+fn elements_that_fail_between_quadrature_points_are_mended_on_their_own() {
+    // Too few points, and a weak barrier.
+    let run = |repairs: usize| {
+        fit(
+            json!({ "generate": "grid", "x": 1, "y": 1, "z": 1, "recipe": [{ "op": "pillow" }] }),
+            Some(json!({ "shape": "pebble", "triangles": 400 })),
+            json!({
+                "order": 4, "quadrature": "gauss", "quadrature_points": 3, "lambda": 1e-3, "iteration_limit": 40,
+                "repairs": repairs,
+            }),
+        )
+        .unwrap()
+    };
+    let (broken, mended) = (run(0), run(3));
+    assert!(broken.metrics["inverted"] > 0.0);
+    assert_eq!(mended.metrics["inverted"], 0.0);
+    assert_eq!(mended.metrics["certified"], 7.0);
+    // The boundary gives way a little.
+    let [before, after] = [&broken, &mended].map(|outcome| outcome.metrics["distance_rms"]);
+    assert!(after < 1.5 * before, "{before} {after}");
+    assert!(
+        mended.notices.iter().any(|notice| notice.contains("0 are left")),
+        "{:?}",
+        mended.notices
+    );
+}
+
+#[test]
 fn bad_input_is_named() {
     let reason = |outcome: Result<Outcome, Failure>| outcome.err().map(|failure| failure.reason).unwrap_or_default();
     let empty = fit(

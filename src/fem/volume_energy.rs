@@ -16,7 +16,7 @@ use crate::energy::{Energy, Variables, invariants};
 use crate::linalg::eigen3::symmetric_eigen;
 use crate::linalg::lanes::{Lanes, Vector, WIDTH, load, store};
 use crate::linalg::processor::{Kernel, Processor};
-use crate::linalg::vector3::{Columns, add, apply, dot, times};
+use crate::linalg::vector3::{Columns, add, apply, cofactor, dot, times};
 use rayon::prelude::*;
 use std::sync::Mutex;
 
@@ -136,6 +136,26 @@ impl VolumeEnergy {
                 cells * group.element.points()
             })
             .sum()
+    }
+
+    /// The cells with a determinant that is not positive at one of their points, ascending.
+    pub fn inverted(&self, x: &[f64]) -> Vec<usize> {
+        let lists: Vec<Vec<usize>> = self
+            .list
+            .par_iter()
+            .map(|&place| {
+                let mut cells = Vec::new();
+                self.batches.visit(self.processor, place, x, |cell, _, jacobian| {
+                    if !(dot(jacobian[0], cofactor(&jacobian)[0]) > 0.0) && cells.last() != Some(&cell) {
+                        cells.push(cell);
+                    }
+                });
+                cells
+            })
+            .collect();
+        let mut cells = lists.concat();
+        cells.sort_unstable();
+        cells
     }
 
     /// The energy.

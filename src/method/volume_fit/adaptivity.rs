@@ -134,7 +134,6 @@ fn raised_by_energy(fit: &Fit<'_>, adaptive: &Adaptive) -> Result<Option<Vec<usi
     let boundary = Boundary::new(&fit.volume, &fit.topology, &space, fit.intervals(highest));
     let mut samples = Vec::new();
     boundary.positions(&x, &mut samples);
-    let mut factor = 0.0;
     if settings.terms.to_target || settings.terms.from_target {
         let mut surface = SurfaceEnergy::new(
             &samples,
@@ -148,7 +147,6 @@ fn raised_by_energy(fit: &Fit<'_>, adaptive: &Adaptive) -> Result<Option<Vec<usi
         let mut forces = vec![[0.0; 3]; samples.len()];
         surface.gradient(&samples, &mut forces);
         boundary.add_gradient(&forces, &mut gradient);
-        factor = surface.factor();
     }
     let diagonal = diagonal(&Model {
         mesh: &fit.volume,
@@ -160,7 +158,7 @@ fn raised_by_energy(fit: &Fit<'_>, adaptive: &Adaptive) -> Result<Option<Vec<usi
         x: &x,
         references: &fit.references,
         volume: fit.reference_volume,
-        surface: factor,
+        surface: fit.surface_factor(),
         anisotropy: settings.anisotropy,
     })
     .map_err(invalid)?;

@@ -1,12 +1,13 @@
 //! A fit under way: the map, what it is fitted to, and the order of its stages.
 
 use super::objective::Parts;
-use super::settings::{Settings, Stage};
+use super::settings::{Settings, Stage, Terms};
 use super::shell::{self, Shell};
 use super::surface_energy::Scale;
 use super::target::{Closure, Target};
 use super::template::{Template, transform};
-use super::{COUNTERS, adaptivity, invalid, orientation, quality, subdivision, untangle, validity};
+use super::validity::Certificates;
+use super::{COUNTERS, adaptivity, invalid, orientation, quality, subdivision, untangle};
 use crate::energy::mapping::Density;
 use crate::fem::batches::{Batches, reference_volume, references_of_volume};
 use crate::fem::space::{Kind, Space};
@@ -40,10 +41,8 @@ pub(super) struct Fit<'a> {
     pub(super) lambda: f64,
     pub(super) increases: usize,
     pub(super) stages: usize,
-    /// Quadrature points added a direction, after elements came out invalid between the points.
-    pub(super) extra_points: usize,
     /// Those of the present map, once they are known.
-    pub(super) certificates: Option<validity::Certificates>,
+    pub(super) certificates: Option<Certificates>,
 }
 
 impl<'a> Fit<'a> {
@@ -142,6 +141,18 @@ impl<'a> Fit<'a> {
                 settings.order
             ));
         }
+        let held = settings
+            .samples
+            .filter(|_| settings.terms.to_target || settings.terms.from_target);
+        if let Some(samples) = held.filter(|&samples| samples < settings.order && settings.levels == 0) {
+            notices.push(format!(
+                "the boundary is sampled at {samples} intervals a side: functions of the orders {} to {} are held by nothing \
+                 between the samples and may fold there; set surface_samples = {} or more",
+                samples + 1,
+                settings.order,
+                settings.order
+            ));
+        }
         let first = settings.stages[0].order;
         let (space, x) = match map {
             None => {
@@ -183,7 +194,6 @@ impl<'a> Fit<'a> {
             lambda: settings.stages[0].lambda,
             increases: 0,
             stages: 0,
-            extra_points: 0,
             certificates: None,
         })
     }
@@ -198,7 +208,7 @@ impl<'a> Fit<'a> {
 
     pub(super) fn volume_energy_of(&self, space: &Space, density: Density) -> Result<VolumeEnergy, Failure> {
         let quadrature = |kind: Kind| {
-            let points = self.settings.quadrature_points(kind.order) + self.extra_points;
+            let points = self.settings.quadrature_points(kind.order);
             self.settings.rule.cell(kind.shape, points)
         };
         let batches = Batches::new(space, &self.references, &quadrature).map_err(invalid)?;
@@ -214,6 +224,16 @@ impl<'a> Fit<'a> {
             let even = (0.5 * sites as f64 / faces as f64).sqrt().ceil() as usize;
             induced.max(even.clamp(2, 16))
         })
+    }
+
+    /// What squared distances are multiplied by in the surface energy, 0 without one.
+    pub(super) fn surface_factor(&self) -> f64 {
+        let Terms { to_target, from_target } = self.settings.terms;
+        if self.shell.is_none() && (to_target || from_target) {
+            self.scale.factor()
+        } else {
+            0.0
+        }
     }
 
     pub(super) fn raise(&mut self, orders: &[usize]) -> Result<(), Failure> {
@@ -295,35 +315,10 @@ impl<'a> Fit<'a> {
                 (stop, reason) = self.stage(&Stage { order, ..last }, observer)?;
             }
         }
-        for _ in 0..self.settings.repairs {
-            if interrupted(stop) {
-                break;
-            }
-            observer.phase("certify");
-            let certificates = validity::certify(&self.space, &self.references, &self.x, observer);
-            let failing = certificates
-                .verdicts
-                .iter()
-                .filter(|verdict| **verdict == validity::Judged::Fails)
-                .count();
-            if failing == 0 {
-                self.certificates = Some(certificates);
-                break;
-            }
-            observer.phase("repair");
-            self.extra_points += 3;
-            self.notices.push(format!(
-                "{failing} elements were invalid between quadrature points; gone on with {} more a direction",
-                self.extra_points
-            ));
-            if !self.volume_energy(&self.space)?.value(&self.x).value.is_finite()
-                && let Some(interrupted) = untangle::untangle(self, observer)?
-            {
-                (stop, reason) = (interrupted, "stopped from outside during a repair".to_string());
-                break;
-            }
-            let last = self.settings.stages[self.settings.stages.len() - 1];
-            (stop, reason) = self.stage(&last, observer)?;
+        if !interrupted(stop)
+            && let Some(interrupted) = self.repair(observer)?
+        {
+            (stop, reason) = (interrupted, "stopped from outside during a repair".to_string());
         }
         self.finish(stop, reason, inverted_at_start, observer)
     }

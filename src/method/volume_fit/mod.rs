@@ -24,6 +24,7 @@ pub mod outcome;
 pub mod picture;
 pub mod preconditioner;
 pub mod quality;
+mod repair;
 pub mod settings;
 pub mod shapes;
 pub mod shell;
@@ -53,7 +54,7 @@ impl Method for VolumeFit {
     }
 
     fn version(&self) -> u32 {
-        4
+        5
     }
 
     fn summary(&self) -> &'static str {

@@ -1,7 +1,8 @@
 //! What is reported of a fit: metrics, traces, the picture and the files.
 
 use super::fit::Fit;
-use super::{TRACES, distances, invalid, picture, quality, shell, validity};
+use super::validity::Certificates;
+use super::{TRACES, distances, invalid, picture, quality, shell};
 use crate::fem::space::Space;
 use crate::method::{Failure, Outcome, Traces};
 use crate::optimize::{Observer, StopReason};
@@ -40,15 +41,15 @@ impl Fit<'_> {
         let flags: Vec<bool> = quality.least_determinant.iter().map(|det| !(*det > 0.0)).collect();
         let certificates = match self.certificates.take() {
             Some(known) => known,
-            None => validity::certify(&self.space, &self.references, &self.x, observer),
+            None => Certificates::of_all(&self.space, &self.references, &self.x, observer),
         };
         let mut set = |name: &str, value: f64| {
             metrics.insert(name.to_string(), value);
         };
         let flags: Vec<bool> = flags
             .iter()
-            .zip(&certificates.verdicts)
-            .map(|(flag, verdict)| *flag || *verdict == validity::Judged::Fails)
+            .enumerate()
+            .map(|(cell, flag)| *flag || certificates.fails(cell))
             .collect();
         set("scaled_jacobian_mean", mean(&quality.scaled_jacobian_mean));
         set("scaled_jacobian_min", least(&quality.scaled_jacobian_min));
@@ -59,16 +60,10 @@ impl Fit<'_> {
             -least(&quality.largest_determinant.iter().map(|det| -det).collect::<Vec<_>>()),
         );
         set("determinant_spread", quality.spread);
-        let judged = |wanted: validity::Judged| {
-            certificates
-                .verdicts
-                .iter()
-                .filter(|verdict| **verdict == wanted)
-                .count() as f64
-        };
-        set("certified", judged(validity::Judged::Certified));
-        set("undecided", judged(validity::Judged::Undecided));
-        set("certified_determinant", certificates.bound);
+        let [certified, _, undecided] = certificates.counts();
+        set("certified", certified as f64);
+        set("undecided", undecided as f64);
+        set("certified_determinant", certificates.bound());
         let ever = self.rows.iter().map(|row| row[7]).fold(f64::INFINITY, f64::min);
         set("least_determinant_ever", if ever.is_finite() { ever } else { f64::NAN });
         set("energy_surface", self.last.surface);
@@ -92,7 +87,7 @@ impl Fit<'_> {
         set("tetrahedra", self.volume.tetrahedra.len() as f64);
         set("stages", self.stages as f64);
         set("inverted_at_start", inverted_at_start as f64);
-        self.notices.extend(certificates.notices);
+        self.notices.extend(certificates.notices());
         let hausdorff = metrics["hausdorff"];
         if hausdorff > POOR && self.shell.is_none() {
             self.notices.push(format!(

@@ -390,7 +390,7 @@ fn diagonal_with(model: &Model<'_>, metrics: &[[f64; 6]]) -> Result<Vec<f64>, St
 }
 
 /// How the surface energy bends by every sample: `n n^T` and a share of the rest, times the sample's area.
-fn sample_blocks(model: &Model<'_>) -> Vec<[f64; 6]> {
+pub(super) fn sample_blocks(model: &Model<'_>) -> Vec<[f64; 6]> {
     let mut sums = vec![[0.0; 3]; model.samples.len()];
     let mut areas = vec![0.0; model.samples.len()];
     for triangle in &model.boundary.triangles {

@@ -257,12 +257,17 @@ impl Settings {
 
     /// Points a direction for cells of an order.
     pub fn quadrature_points(&self, order: usize) -> usize {
-        self.points.unwrap_or(match self.rule {
+        self.points.unwrap_or_else(|| self.usual_points(self.rule, order))
+    }
+
+    /// Points a direction of a rule for cells of an order where the file leaves them open.
+    pub fn usual_points(&self, rule: Rule, order: usize) -> usize {
+        match rule {
             Rule::Gauss if self.basis.is_polynomial() => (order + 2).max(3),
             Rule::Lobatto if self.basis.is_polynomial() => order + 3,
             Rule::Gauss | Rule::Lobatto => (2 * order).max(3),
             Rule::Trapezoid => (2 * order - 1).max(2),
-        })
+        }
     }
 }
 

@@ -2,11 +2,11 @@
 
 use super::chart::Chart;
 use super::fit::Fit;
+use super::invalid;
 use super::objective::{FitObjective, Parts};
 use super::preconditioner::{Model, Preconditioner};
 use super::settings::Stage;
 use super::surface_energy::SurfaceEnergy;
-use super::{invalid, untangle};
 use crate::fem::boundary::Boundary;
 use crate::method::Failure;
 use crate::optimize::lbfgs::Lbfgs;
@@ -108,11 +108,9 @@ impl Fit<'_> {
         self.lambda = stage.lambda;
         let order = self.space.orders.iter().copied().max().unwrap_or(1);
         let volume = self.volume_energy(&self.space)?;
-        if !volume.value(&self.x).value.is_finite()
-            && settings.untangle
-            && let Some(stop) = untangle::untangle(self, observer)?
+        if settings.untangle
+            && let Some(stop) = self.mend(&volume, observer)?
         {
-            // More points than in the stage before found an inversion.
             return Ok((stop, "stopped from outside while elements were untangled".to_string()));
         }
         let boundary = Boundary::new(&self.volume, &self.topology, &self.space, self.intervals(order));
@@ -134,7 +132,6 @@ impl Fit<'_> {
         };
         let latest = Rc::new(Cell::new(Parts::default()));
         let floor = Rc::new(Cell::new(f64::NEG_INFINITY));
-        let factor = surface.as_ref().map_or(0.0, SurfaceEnergy::factor);
         let mut done = 0;
         let mut previous = f64::INFINITY;
         // The energy when a round last ended for its small change.
@@ -154,7 +151,7 @@ impl Fit<'_> {
                     x: &self.x,
                     references: &self.references,
                     volume: self.reference_volume,
-                    surface: factor,
+                    surface: self.surface_factor(),
                     anisotropy: settings.anisotropy,
                 };
                 let made = Preconditioner::new(&model).map_err(invalid)?;

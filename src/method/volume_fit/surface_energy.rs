@@ -44,6 +44,12 @@ impl Scale {
             volume: if closed && volume > 0.0 { volume } else { own.volume },
         }
     }
+
+    /// `1 / (A L^2)`, before the sum of squared distances.
+    pub fn factor(&self) -> f64 {
+        let length = self.volume / self.area;
+        1.0 / (self.area * length * length)
+    }
 }
 
 impl SurfaceEnergy {
@@ -73,20 +79,14 @@ impl SurfaceEnergy {
         if to_target.is_none() && from_target.is_none() && (terms.to_target || terms.from_target) {
             return Err("a cloud of points has no surface to measure from; set distance = \"to-target\"".to_string());
         }
-        let length = scale.volume / scale.area;
         Ok(SurfaceEnergy {
             to_target,
             from_target,
             anisotropy,
-            factor: 1.0 / (scale.area * length * length),
+            factor: scale.factor(),
             room: Vec::new(),
             has_normals: target.normals.iter().any(|normal| *normal != [0.0; 3]),
         })
-    }
-
-    /// One over `A L^2`.
-    pub fn factor(&self) -> f64 {
-        self.factor
     }
 
     /// The value at these samples; the derivative is written to `gradient`.

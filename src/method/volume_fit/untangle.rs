@@ -10,6 +10,7 @@ use super::surface_energy::SurfaceEnergy;
 use crate::energy::mapping::Density;
 use crate::energy::untangling::Untangling;
 use crate::fem::boundary::Boundary;
+use crate::fem::volume_energy::Evaluation;
 use crate::method::Failure;
 use crate::optimize::lbfgs::Lbfgs;
 use crate::optimize::{Iterate, Observer, StopReason, Stopping};
@@ -23,7 +24,7 @@ const ITERATIONS: u64 = 60;
 const DECREASE: f64 = 0.1;
 
 /// Passes on the wish to stop, and nothing else.
-struct Quiet<'a>(&'a mut dyn Observer);
+pub(super) struct Quiet<'a>(pub(super) &'a mut dyn Observer);
 
 impl Observer for Quiet<'_> {
     fn phase(&mut self, _name: &str) {}
@@ -31,6 +32,58 @@ impl Observer for Quiet<'_> {
     fn stop(&self) -> Option<StopReason> {
         self.0.stop()
     }
+}
+
+/// What the minimization of the regularized energy came to.
+pub(super) struct Round {
+    /// The energy before it.
+    pub(super) before: f64,
+    pub(super) after: Evaluation,
+}
+
+/// How turning ended.
+pub(super) enum Turned {
+    Positive,
+    /// With this least determinant.
+    Stuck(f64),
+    Stopped(StopReason),
+}
+
+/// Minimizes with a falling regularization, first with `epsilon`, until the least determinant is positive.
+pub(super) fn turn(
+    epsilon: f64,
+    mut least: f64,
+    mut minimize: impl FnMut(Untangling, &mut dyn Observer) -> Result<Round, Failure>,
+    observer: &mut dyn Observer,
+) -> Result<Turned, Failure> {
+    let mut regularization = Untangling { epsilon, lambda: 1.0 };
+    for _ in 0..ROUNDS {
+        if least > 0.0 {
+            return Ok(Turned::Positive);
+        }
+        let round = minimize(regularization, observer)?;
+        if let Some(stop) = observer.stop() {
+            return Ok(Turned::Stopped(stop));
+        }
+        least = round.after.least_determinant;
+        // The next epsilon: the least determinant is to look worse by a share.
+        let fall = (1.0 - round.after.value / round.before).clamp(DECREASE, 0.9);
+        let wanted = (1.0 - fall) * regularization.chi(least);
+        let square = 4.0 * wanted * (wanted - least);
+        regularization.epsilon = if square > 0.0 {
+            square.sqrt().min(0.9 * regularization.epsilon)
+        } else {
+            0.5 * regularization.epsilon
+        };
+        if !(regularization.epsilon > 1e-12) {
+            break;
+        }
+    }
+    Ok(if least > 0.0 {
+        Turned::Positive
+    } else {
+        Turned::Stuck(least)
+    })
 }
 
 /// Moves the nodes until all determinants at quadrature points are positive. `Some` when the observer asked to stop.
@@ -56,72 +109,55 @@ pub(super) fn untangle(fit: &mut Fit<'_>, observer: &mut dyn Observer) -> Result
         );
         surface = Some(energy.map_err(invalid)?);
     }
-    let mut regularization = Untangling {
-        epsilon: 1.0,
-        lambda: 1.0,
-    };
-    let mut least = fit.volume_energy(&fit.space)?.value(&fit.x).least_determinant;
-    for _ in 0..ROUNDS {
-        if least > 0.0 {
-            return Ok(None);
-        }
-        let volume = fit.volume_energy_of(&fit.space, Density::of(regularization))?;
-        let latest = Rc::new(Cell::new(Parts::default()));
-        let mut objective = FitObjective {
-            volume: &volume,
-            boundary: &boundary,
-            surface: surface.as_mut(),
-            lambda: 0.05,
-            preconditioner: None,
-            latest: latest.clone(),
-            floor: Rc::new(Cell::new(f64::NEG_INFINITY)),
-            samples: Vec::new(),
-            forces: Vec::new(),
-            room: Vec::new(),
-            chart: None,
-            nodes: Default::default(),
-        };
-        let lbfgs = Lbfgs {
-            stopping: Stopping {
-                gradient_norm: 1e-10,
-                relative_decrement: 0.0,
-                relative_change: 1e-4,
-                iterations: ITERATIONS,
-                ..Stopping::default()
-            },
-            ..Lbfgs::default()
-        };
-        let before = volume.value(&fit.x).value;
-        let solution = lbfgs.minimize(&mut objective, std::mem::take(&mut fit.x), &mut Quiet(observer));
-        fit.x = solution.x;
-        fit.count("iterations", solution.counters.iterations);
-        fit.count("evaluations", solution.counters.evaluations);
-        if let Some(stop) = observer.stop() {
-            return Ok(Some(stop));
-        }
-        let after = volume.value(&fit.x);
-        least = after.least_determinant;
-        // The next epsilon: the least determinant is to look worse by a share.
-        let fall = (1.0 - after.value / before).clamp(DECREASE, 0.9);
-        let wanted = (1.0 - fall) * regularization.chi(least);
-        let square = 4.0 * wanted * (wanted - least);
-        regularization.epsilon = if square > 0.0 {
-            square.sqrt().min(0.9 * regularization.epsilon)
-        } else {
-            0.5 * regularization.epsilon
-        };
-        if !(regularization.epsilon > 1e-12) {
-            break;
-        }
+    let least = fit.volume_energy(&fit.space)?.value(&fit.x).least_determinant;
+    let turned = turn(
+        1.0,
+        least,
+        |regularization, observer| {
+            let volume = fit.volume_energy_of(&fit.space, Density::of(regularization))?;
+            let mut objective = FitObjective {
+                volume: &volume,
+                boundary: &boundary,
+                surface: surface.as_mut(),
+                lambda: 0.05,
+                preconditioner: None,
+                latest: Rc::new(Cell::new(Parts::default())),
+                floor: Rc::new(Cell::new(f64::NEG_INFINITY)),
+                samples: Vec::new(),
+                forces: Vec::new(),
+                room: Vec::new(),
+                chart: None,
+                nodes: Default::default(),
+            };
+            let lbfgs = Lbfgs {
+                stopping: Stopping {
+                    gradient_norm: 1e-10,
+                    relative_decrement: 0.0,
+                    relative_change: 1e-4,
+                    iterations: ITERATIONS,
+                    ..Stopping::default()
+                },
+                ..Lbfgs::default()
+            };
+            let before = volume.value(&fit.x).value;
+            let solution = lbfgs.minimize(&mut objective, std::mem::take(&mut fit.x), &mut Quiet(observer));
+            fit.x = solution.x;
+            fit.count("iterations", solution.counters.iterations);
+            fit.count("evaluations", solution.counters.evaluations);
+            let after = volume.value(&fit.x);
+            Ok(Round { before, after })
+        },
+        observer,
+    )?;
+    match turned {
+        Turned::Positive => Ok(None),
+        Turned::Stopped(stop) => Ok(Some(stop)),
+        Turned::Stuck(least) => Err(Failure {
+            kind: "tangled".to_string(),
+            reason: format!(
+                "elements stay inverted: the least determinant at a quadrature point is {least:.3e} after untangling; use \
+                 a better template, more elements, or a larger lambda"
+            ),
+        }),
     }
-    if least > 0.0 {
-        return Ok(None);
-    }
-    Err(Failure {
-        kind: "tangled".to_string(),
-        reason: format!(
-            "elements stay inverted: the least determinant at a quadrature point is {least:.3e} after untangling; use a \
-             better template, more elements, or a larger lambda"
-        ),
-    })
 }

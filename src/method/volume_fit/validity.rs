@@ -6,21 +6,11 @@ use crate::linalg::vector3::Columns;
 use crate::optimize::Observer;
 use rayon::prelude::*;
 
-/// What is known of an element's validity.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Judged {
-    Certified,
-    Fails,
-    Undecided,
-}
-
 /// Certificates of all elements.
 #[derive(Clone, Debug)]
 pub struct Certificates {
-    pub verdicts: Vec<Judged>,
-    /// Least proven bound of the determinant over the certified elements.
-    pub bound: f64,
-    pub notices: Vec<String>,
+    /// Nothing where the observer asked to stop before the element was judged.
+    pub verdicts: Vec<Option<Verdict>>,
 }
 
 /// Parts that an element is cut into at most.
@@ -29,64 +19,112 @@ const MOST_PARTS: usize = 4000;
 /// Elements judged before the observer is asked again.
 const CHUNK: usize = 16;
 
-/// Proves that determinants are positive everywhere, element by element.
-pub fn certify(space: &Space, references: &[Columns<f64>], x: &[f64], observer: &dyn Observer) -> Certificates {
-    let cells = space.cells.len();
-    let kinds = space.cells.iter().map(|cell| cell.kind);
-    let certifier = Certifier::new(space.basis, kinds, MOST_PARTS);
-    let mut result = Certificates {
-        verdicts: Vec::with_capacity(cells),
-        bound: f64::NAN,
-        notices: Vec::new(),
-    };
-    let mut first: Option<(usize, [f64; 3], f64)> = None;
-    let mut open: Option<f64> = None;
-    while result.verdicts.len() < cells {
-        if observer.stop().is_some() {
-            result.verdicts.resize(cells, Judged::Undecided);
-            result
-                .notices
-                .push("stopped from outside before every element was judged".to_string());
-            break;
+impl Certificates {
+    /// Proves that determinants are positive everywhere, element by element.
+    pub fn of_all(space: &Space, references: &[Columns<f64>], x: &[f64], observer: &dyn Observer) -> Certificates {
+        let cells: Vec<usize> = (0..space.cells.len()).collect();
+        let mut result = Certificates {
+            verdicts: vec![None; cells.len()],
+        };
+        result.renew(&cells, space, references, x, observer);
+        result
+    }
+
+    /// Judges some elements again, whose nodes have moved.
+    pub fn renew(
+        &mut self,
+        cells: &[usize],
+        space: &Space,
+        references: &[Columns<f64>],
+        x: &[f64],
+        observer: &dyn Observer,
+    ) {
+        for &cell in cells {
+            self.verdicts[cell] = None;
         }
-        let start = result.verdicts.len();
-        let verdicts: Vec<Verdict> = (start..(start + CHUNK).min(cells))
-            .into_par_iter()
-            .map(|cell| certifier.judge(space, cell, &references[cell], x))
-            .collect();
-        for (offset, verdict) in verdicts.into_iter().enumerate() {
-            result.verdicts.push(match verdict {
-                Verdict::Positive(bound) => {
-                    result.bound = result.bound.min(bound);
-                    Judged::Certified
-                }
-                Verdict::Negative(point, value) => {
-                    first.get_or_insert((start + offset, point, value));
-                    Judged::Fails
-                }
-                Verdict::Undecided(bound) => {
-                    open = Some(open.map_or(bound, |other: f64| other.min(bound)));
-                    Judged::Undecided
-                }
-            });
+        let kinds = cells.iter().map(|&cell| space.cells[cell].kind);
+        let certifier = Certifier::new(space.basis, kinds, MOST_PARTS);
+        for chunk in cells.chunks(CHUNK) {
+            if observer.stop().is_some() {
+                return;
+            }
+            let verdicts: Vec<Verdict> = chunk
+                .par_iter()
+                .map(|&cell| certifier.judge(space, cell, &references[cell], x))
+                .collect();
+            for (&cell, verdict) in chunk.iter().zip(verdicts) {
+                self.verdicts[cell] = Some(verdict);
+            }
         }
     }
-    if let Some(bound) = open {
-        result.notices.push(format!(
-            "elements stay undecided after as many cuts as they may take: no point of theirs with a determinant below 0 was \
-             found, and a proof only that it is at least {bound:.3e}"
-        ));
+
+    /// Whether a point with a determinant that is not positive is known in an element.
+    pub fn fails(&self, cell: usize) -> bool {
+        matches!(self.verdicts[cell], Some(Verdict::Negative(..)))
     }
-    if let Some((cell, point, value)) = first {
-        let count = result
+
+    /// Elements that are judged and not certified.
+    pub fn uncertified(&self) -> Vec<usize> {
+        let verdicts = self.verdicts.iter().enumerate();
+        verdicts
+            .filter(|(_, verdict)| matches!(verdict, Some(Verdict::Negative(..) | Verdict::Undecided(_))))
+            .map(|(cell, _)| cell)
+            .collect()
+    }
+
+    /// Numbers of elements that are certified, that fail, and that are neither.
+    pub fn counts(&self) -> [usize; 3] {
+        let mut counts = [0; 3];
+        for verdict in &self.verdicts {
+            counts[match verdict {
+                Some(Verdict::Positive(_)) => 0,
+                Some(Verdict::Negative(..)) => 1,
+                Some(Verdict::Undecided(_)) | None => 2,
+            }] += 1;
+        }
+        counts
+    }
+
+    /// Least proven bound of the determinant over the certified elements; not-a-number without any.
+    pub fn bound(&self) -> f64 {
+        let proven = self.verdicts.iter().filter_map(|verdict| match verdict {
+            Some(Verdict::Positive(bound)) => Some(*bound),
+            _ => None,
+        });
+        proven.fold(f64::NAN, f64::min)
+    }
+
+    /// What is to be told of elements that are not certified.
+    pub fn notices(&self) -> Vec<String> {
+        let mut notices = Vec::new();
+        if self.verdicts.contains(&None) {
+            notices.push("stopped from outside before every element was judged".to_string());
+        }
+        let open = self.verdicts.iter().filter_map(|verdict| match verdict {
+            Some(Verdict::Undecided(bound)) => Some(*bound),
+            _ => None,
+        });
+        if let Some(bound) = open.reduce(f64::min) {
+            notices.push(format!(
+                "elements stay undecided after as many cuts as they may take: no point of theirs with a determinant below \
+                 0 was found, and a proof only that it is at least {bound:.3e}"
+            ));
+        }
+        let first = self
             .verdicts
             .iter()
-            .filter(|verdict| **verdict == Judged::Fails)
-            .count();
-        result.notices.push(format!(
-            "{count} elements are not valid everywhere; the first is element {cell}, whose determinant is {value:.3e} at \
-             {point:.4?} in its canonical coordinates"
-        ));
+            .enumerate()
+            .find_map(|(cell, verdict)| match verdict {
+                Some(Verdict::Negative(point, value)) => Some((cell, point, value)),
+                _ => None,
+            });
+        if let Some((cell, point, value)) = first {
+            notices.push(format!(
+                "{} elements are not valid everywhere; the first is element {cell}, whose determinant is {value:.3e} at \
+                 {point:.4?} in its canonical coordinates",
+                self.counts()[1]
+            ));
+        }
+        notices
     }
-    result
 }

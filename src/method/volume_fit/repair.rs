@@ -1,0 +1,395 @@
+//! Mending single elements: those that are invalid somewhere move, and those around them; all others stay.
+//!
+//! The patch of elements has a volume energy of its own, with more quadrature points. In place of the surface energy
+//! stands its model about the boundary as it was: a parabola along the normals, and a flat one along the surface (see
+//! [`super::preconditioner`]). First determinants are turned, then the barrier spaces them out. Not guaranteed: success,
+//! and that the mended map is a minimum of the whole energy; it differs from one in the patch alone.
+
+use super::fit::Fit;
+use super::objective::Parts;
+use super::preconditioner::{self, Model};
+use super::surface_energy::SurfaceEnergy;
+use super::untangle::{Quiet, Round, Turned, turn};
+use super::validity::Certificates;
+use super::{invalid, untangle};
+use crate::energy::mapping::Density;
+use crate::fem::batches::{Batches, reference_volume};
+use crate::fem::boundary::Boundary;
+use crate::fem::quadrature::Rule;
+use crate::fem::space::{Kind, Space};
+use crate::fem::volume_energy::VolumeEnergy;
+use crate::linalg::vector3::{Columns, subtract};
+use crate::mesh::mixed::{MixedMesh, Topology};
+use crate::method::Failure;
+use crate::optimize::lbfgs::Lbfgs;
+use crate::optimize::{Objective, Observer, Solution, StopReason, Stopping};
+
+/// Iterations at most with one regularization, and with the barrier.
+const TURNING: u64 = 60;
+const SPACING: u64 = 150;
+
+/// Share of the energy below which its change ends a minimization.
+const CHANGE: f64 = 1e-6;
+
+/// The regularization at the start, in multiples of the least determinant.
+const SOFTNESS: f64 = 2.0;
+
+/// Quadrature points a direction that every repair has more than the one before.
+const EXTRA: usize = 3;
+
+/// How much more the volume energy counts in every repair than in the one before.
+const STRONGER: f64 = 10.0;
+
+/// Rings of elements about an invalid one that move at most.
+const MOST_RINGS: usize = 3;
+
+/// Elements that may move, as a mesh of their own.
+struct Patch {
+    /// Their numbers in the whole mesh, ascending.
+    cells: Vec<usize>,
+    mesh: MixedMesh,
+    topology: Topology,
+    space: Space,
+    references: Vec<Columns<f64>>,
+    x: Vec<f64>,
+    /// For every node, the node of the whole space; nothing where that has none.
+    nodes: Vec<Option<usize>>,
+    /// Whether no element outside has the node.
+    free: Vec<bool>,
+}
+
+impl Patch {
+    /// The elements `seeds` with `rings` of elements about them that share a vertex.
+    fn around(fit: &Fit<'_>, seeds: &[usize], rings: usize) -> Result<Patch, Failure> {
+        let volume = &fit.volume;
+        let mut chosen = vec![false; volume.cells()];
+        for &seed in seeds {
+            chosen[seed] = true;
+        }
+        for _ in 0..rings {
+            let mut touched = vec![false; volume.points.len()];
+            for (_, corners) in volume
+                .iter()
+                .zip(&chosen)
+                .filter(|(_, chosen)| **chosen)
+                .map(|(cell, _)| cell)
+            {
+                corners.iter().for_each(|&corner| touched[corner as usize] = true);
+            }
+            for ((_, corners), chosen) in volume.iter().zip(&mut chosen) {
+                *chosen |= corners.iter().any(|&corner| touched[corner as usize]);
+            }
+        }
+        let cells: Vec<usize> = (0..volume.cells()).filter(|&cell| chosen[cell]).collect();
+        // Vertices keep their order, and with it the orientation of edges and faces.
+        let mut vertices: Vec<u32> = cells.iter().flat_map(|&cell| volume.cell(cell).1.to_vec()).collect();
+        vertices.sort_unstable();
+        vertices.dedup();
+        let mut mesh = MixedMesh {
+            points: vertices.iter().map(|&vertex| volume.points[vertex as usize]).collect(),
+            ..MixedMesh::default()
+        };
+        for &cell in &cells {
+            let (shape, corners) = volume.cell(cell);
+            let local = corners
+                .iter()
+                .map(|corner| vertices.partition_point(|vertex| vertex < corner) as u32);
+            mesh.push(shape, &local.collect::<Vec<_>>());
+        }
+        let topology = mesh.topology().map_err(invalid)?;
+        let orders: Vec<usize> = cells.iter().map(|&cell| fit.space.orders[cell]).collect();
+        let space = Space::new(&mesh, &topology, fit.settings.basis, &orders).map_err(invalid)?;
+        let mut inside = vec![true; fit.space.nodes];
+        for (cell, _) in fit.space.cells.iter().zip(&chosen).filter(|(_, chosen)| !**chosen) {
+            for (node, _) in cell.slots.iter().filter_map(|slot| slot.node()) {
+                inside[node] = false;
+            }
+        }
+        let mut nodes = vec![None; space.nodes];
+        let mut x = vec![0.0; 3 * space.nodes];
+        for (own, &cell) in space.cells.iter().zip(&cells) {
+            for (slot, whole) in own.slots.iter().zip(&fit.space.cells[cell].slots) {
+                if let (Some((node, _)), Some((place, _))) = (slot.node(), whole.node()) {
+                    nodes[node] = Some(place);
+                    x[3 * node..3 * node + 3].copy_from_slice(&fit.x[3 * place..3 * place + 3]);
+                }
+            }
+        }
+        let free = nodes.iter().map(|node| node.is_some_and(|node| inside[node])).collect();
+        Ok(Patch {
+            references: cells.iter().map(|&cell| fit.references[cell]).collect(),
+            cells,
+            mesh,
+            topology,
+            space,
+            x,
+            nodes,
+            free,
+        })
+    }
+
+    fn volume_energy(&self, fit: &Fit<'_>, extra: usize, density: Density) -> Result<VolumeEnergy, Failure> {
+        let quadrature = |kind: Kind| {
+            // Points on corners and edges, where elements fail first.
+            let rule = Rule::Lobatto;
+            let points = fit.settings.usual_points(rule, kind.order);
+            let given = fit.settings.points.unwrap_or(0);
+            rule.cell(kind.shape, points.max(given) + extra)
+        };
+        let batches = Batches::new(&self.space, &self.references, &quadrature).map_err(invalid)?;
+        VolumeEnergy::new(batches, density).map_err(invalid)
+    }
+}
+
+/// The patch's volume energy, and the model of the surface energy about the boundary as it was.
+struct PatchObjective<'a> {
+    volume: &'a VolumeEnergy,
+    lambda: f64,
+    boundary: &'a Boundary,
+    /// Samples of the boundary as it was, and how the energy bends there: 00 01 02 11 12 22.
+    anchors: &'a [[f64; 3]],
+    blocks: &'a [[f64; 6]],
+    /// One over the diagonal of a model of the Hessian; 0 for nodes that stay.
+    inverse: &'a [f64],
+    samples: Vec<[f64; 3]>,
+    room: Vec<f64>,
+}
+
+impl Objective for PatchObjective<'_> {
+    fn dimension(&self) -> usize {
+        3 * self.inverse.len()
+    }
+
+    fn value(&mut self, x: &[f64]) -> f64 {
+        let mut gradient = std::mem::take(&mut self.room);
+        gradient.resize(x.len(), 0.0);
+        let value = self.gradient(x, &mut gradient);
+        self.room = gradient;
+        value
+    }
+
+    fn gradient(&mut self, x: &[f64], gradient: &mut [f64]) -> f64 {
+        gradient.fill(0.0);
+        let volume = self.volume.add_gradient(x, self.lambda, gradient);
+        if !volume.value.is_finite() {
+            return f64::INFINITY;
+        }
+        self.boundary.positions(x, &mut self.samples);
+        let mut surface = 0.0;
+        for ((sample, anchor), [a, b, c, d, e, f]) in self.samples.iter_mut().zip(self.anchors).zip(self.blocks) {
+            let [x, y, z] = subtract(*sample, *anchor);
+            let force = [a * x + b * y + c * z, b * x + d * y + e * z, c * x + e * y + f * z];
+            surface += 0.5 * (force[0] * x + force[1] * y + force[2] * z);
+            *sample = force;
+        }
+        self.boundary.add_gradient(&self.samples, gradient);
+        for (gradient, &inverse) in gradient.chunks_exact_mut(3).zip(self.inverse) {
+            if inverse == 0.0 {
+                gradient.fill(0.0);
+            }
+        }
+        surface + self.lambda * volume.value
+    }
+
+    fn is_preconditioned(&self) -> bool {
+        true
+    }
+
+    fn precondition(&mut self, vector: &mut [f64]) {
+        for (values, &inverse) in vector.chunks_exact_mut(3).zip(self.inverse) {
+            values.iter_mut().for_each(|value| *value *= inverse);
+        }
+    }
+}
+
+impl Fit<'_> {
+    /// Makes determinants at the points of this volume energy positive again: elements that a stage before left valid at
+    /// its own points may be invalid at others. `Some` when the observer asked to stop.
+    ///
+    /// # Errors
+    /// `tangled` when elements stay inverted.
+    pub(super) fn mend(
+        &mut self,
+        volume: &VolumeEnergy,
+        observer: &mut dyn Observer,
+    ) -> Result<Option<StopReason>, Failure> {
+        for rings in 1..=MOST_RINGS {
+            let inverted = volume.inverted(&self.x);
+            if inverted.is_empty() {
+                return Ok(None);
+            }
+            observer.phase("repair");
+            repair(self, &inverted, rings, 0, self.lambda, observer)?;
+            if let Some(stop) = observer.stop() {
+                return Ok(Some(stop));
+            }
+        }
+        if volume.value(&self.x).value.is_finite() {
+            return Ok(None);
+        }
+        untangle::untangle(self, observer)
+    }
+
+    /// Mends the elements that are not certified. `Some` when the observer asked to stop.
+    pub(super) fn repair(&mut self, observer: &mut dyn Observer) -> Result<Option<StopReason>, Failure> {
+        if self.settings.repairs == 0 {
+            return Ok(None);
+        }
+        observer.phase("certify");
+        let mut certificates = Certificates::of_all(&self.space, &self.references, &self.x, observer);
+        let mut mended = 0;
+        for round in 0..self.settings.repairs {
+            let failing = certificates.uncertified();
+            if failing.is_empty() || observer.stop().is_some() {
+                break;
+            }
+            observer.phase("repair");
+            let rings = (1 + round).min(MOST_RINGS);
+            let lambda = self.lambda * STRONGER.powi(round as i32);
+            let moved = repair(self, &failing, rings, EXTRA * (1 + round), lambda, observer)?;
+            if observer.stop().is_some() {
+                break;
+            }
+            observer.phase("certify");
+            certificates.renew(&moved, &self.space, &self.references, &self.x, observer);
+            mended = mended.max(failing.len());
+        }
+        if mended > 0 {
+            let left = certificates.uncertified().len();
+            self.notices.push(format!(
+                "{mended} elements could not be certified after the last stage; these and their neighbours were moved \
+                 on their own, with more quadrature points: {left} are left"
+            ));
+            self.measure_energy()?;
+        }
+        self.certificates = Some(certificates);
+        Ok(observer.stop())
+    }
+
+    /// The parts of the energy at the present map.
+    fn measure_energy(&mut self) -> Result<(), Failure> {
+        let volume = self.volume_energy(&self.space)?.value(&self.x);
+        let order = self.space.orders.iter().copied().max().unwrap_or(1);
+        let boundary = Boundary::new(&self.volume, &self.topology, &self.space, self.intervals(order));
+        let mut samples = Vec::new();
+        boundary.positions(&self.x, &mut samples);
+        let mut surface = 0.0;
+        if self.surface_factor() > 0.0 {
+            let mut energy = SurfaceEnergy::new(
+                &samples,
+                &boundary.triangles,
+                &self.target,
+                self.settings.terms,
+                self.settings.anisotropy,
+                self.scale,
+            )
+            .map_err(invalid)?;
+            surface = energy.gradient(&samples, &mut vec![[0.0; 3]; samples.len()]);
+        }
+        self.last = Parts {
+            surface,
+            volume: volume.value,
+            least_determinant: volume.least_determinant,
+        };
+        Ok(())
+    }
+}
+
+/// Moves the elements `seeds` and `rings` of elements about them until determinants are positive at the quadrature's
+/// points, no fewer than usual and `extra` more a direction, and then to the least energy with this weight of the volume. Gives the elements that moved:
+/// none, and the map as it was, where determinants could not be turned or the observer asked to stop.
+fn repair(
+    fit: &mut Fit<'_>,
+    seeds: &[usize],
+    rings: usize,
+    extra: usize,
+    lambda: f64,
+    observer: &mut dyn Observer,
+) -> Result<Vec<usize>, Failure> {
+    let patch = Patch::around(fit, seeds, rings)?;
+    let barrier = patch.volume_energy(fit, extra, Density::new(fit.settings.energy))?;
+    let own: f64 = (patch.mesh.iter().zip(&patch.references))
+        .map(|((shape, _), reference)| reference_volume(shape, reference))
+        .sum();
+    let order = patch.space.orders.iter().copied().max().unwrap_or(1);
+    let boundary = Boundary::new(&patch.mesh, &patch.topology, &patch.space, fit.intervals(order));
+    let mut anchors = Vec::new();
+    boundary.positions(&patch.x, &mut anchors);
+    let model = Model {
+        mesh: &patch.mesh,
+        topology: &patch.topology,
+        space: &patch.space,
+        boundary: &boundary,
+        samples: &anchors,
+        x: &patch.x,
+        references: &patch.references,
+        lambda,
+        volume: fit.reference_volume,
+        surface: fit.surface_factor(),
+        anisotropy: fit.settings.anisotropy,
+    };
+    let blocks = preconditioner::sample_blocks(&model);
+    let diagonal = preconditioner::diagonal(&model).map_err(invalid)?;
+    let inverse: Vec<f64> = (diagonal.iter().zip(&patch.free))
+        .map(|(&value, &free)| if free { 1.0 / value.max(f64::MIN_POSITIVE) } else { 0.0 })
+        .collect();
+    let mut x = patch.x.clone();
+    let minimize = |volume: &VolumeEnergy, x: Vec<f64>, iterations: u64, observer: &mut dyn Observer| -> Solution {
+        let mut objective = PatchObjective {
+            volume,
+            lambda: lambda * own / fit.reference_volume,
+            boundary: &boundary,
+            anchors: &anchors,
+            blocks: &blocks,
+            inverse: &inverse,
+            samples: Vec::new(),
+            room: Vec::new(),
+        };
+        let lbfgs = Lbfgs {
+            stopping: Stopping {
+                gradient_norm: fit.settings.gradient_tolerance,
+                relative_decrement: 0.0,
+                relative_change: CHANGE,
+                iterations,
+                ..Stopping::default()
+            },
+            ..Lbfgs::default()
+        };
+        lbfgs.minimize(&mut objective, x, &mut Quiet(observer))
+    };
+    let mut counted = [0; 2];
+    let mut count = |solution: &Solution| {
+        counted[0] += solution.counters.iterations;
+        counted[1] += solution.counters.evaluations;
+    };
+    let least = barrier.value(&x).least_determinant;
+    let softness = (SOFTNESS * least.abs()).min(1.0);
+    let turned = turn(
+        softness,
+        least,
+        |regularization, observer| {
+            let volume = patch.volume_energy(fit, extra, Density::of(regularization))?;
+            let before = volume.value(&x).value;
+            let solution = minimize(&volume, std::mem::take(&mut x), TURNING, observer);
+            count(&solution);
+            x = solution.x;
+            let after = volume.value(&x);
+            Ok(Round { before, after })
+        },
+        observer,
+    )?;
+    let mut moved = Vec::new();
+    if matches!(turned, Turned::Positive) {
+        let solution = minimize(&barrier, x, SPACING, observer);
+        count(&solution);
+        for (node, (place, free)) in patch.nodes.iter().zip(&patch.free).enumerate() {
+            if let (Some(place), true) = (place, free) {
+                fit.x[3 * place..3 * place + 3].copy_from_slice(&solution.x[3 * node..3 * node + 3]);
+            }
+        }
+        moved = patch.cells;
+    }
+    fit.count("iterations", counted[0]);
+    fit.count("evaluations", counted[1]);
+    Ok(moved)
+}

@@ -71,7 +71,11 @@ struct Cell<'a> {
 
 impl Certifier {
     pub(super) fn polynomial_cell(&self, kind: Kind, coefficients: &[[f64; 3]], inverse: &Columns<f64>) -> Verdict {
-        let own = self.centred(kind, coefficients);
+        let mut own = self.centred(kind, coefficients);
+        if determinant(inverse) < 0.0 {
+            // A tetrahedron's functions may be framed the other way round: its mirror image has a positive determinant.
+            own.iter_mut().for_each(|c| c[0] = -c[0]);
+        }
         let (positions, error) = self.positions(kind, &own, [(0, 0); 3]);
         let order = kind.order;
         let points = positions.len() / 3;
@@ -118,13 +122,13 @@ impl Certifier {
             error,
         };
         let most = HALVES * self.most(kind);
-        let scale = determinant(inverse);
+        let whole_scale = determinant(inverse).abs();
         let mut stack = vec![whole];
         let (mut parts, mut bound) = (0, f64::INFINITY);
         while let Some(mut part) = stack.pop() {
             parts += 1;
             // The determinant on a part against that on the cell.
-            let scale = 2.0_f64.powi(part.cuts) * scale;
+            let scale = 2.0_f64.powi(part.cuts) * whole_scale;
             let mut proved = cell.prove(&part);
             if proved.is_err_and(|delta| delta > PRECISE) && part.cuts > part.since && kind.shape == Shape::Hexahedron {
                 (part.positions, part.error) = self.positions(kind, &own, intervals(&part));
@@ -146,7 +150,7 @@ impl Certifier {
                 stack.push(part);
                 let roughs = stack.iter().map(|part| {
                     cell.differentiate(part);
-                    2.0_f64.powi(part.cuts) * determinant(inverse) * cell.rough(part)
+                    2.0_f64.powi(part.cuts) * whole_scale * cell.rough(part)
                 });
                 return Verdict::Undecided(roughs.fold(f64::INFINITY, f64::min));
             }

@@ -273,8 +273,8 @@ pub static FIELDS: &[Field] = &[
         name: "repairs",
         kind: Kind::Integer { min: 0, max: 10 },
         default: Default::Absent,
-        doc: "How often, at most, elements that are not certified at the end are moved on their own, with their neighbours \
-              and more quadrature points every time. Preset best: 3, paper: 0.",
+        doc: "How often, at most, elements that are invalid between quadrature points at the end are moved on their own, with \
+              their neighbours and more points every time. Preset best: 3, paper: 0.",
     },
     Field {
         name: "subdivision_levels",

@@ -230,7 +230,7 @@ impl Fit<'_> {
         untangle::untangle(self, observer)
     }
 
-    /// Mends the elements that are not certified. `Some` when the observer asked to stop.
+    /// Mends the elements that fail between the points. `Some` when the observer asked to stop.
     pub(super) fn repair(&mut self, observer: &mut dyn Observer) -> Result<Option<StopReason>, Failure> {
         if self.settings.repairs == 0 {
             return Ok(None);
@@ -239,7 +239,7 @@ impl Fit<'_> {
         let mut certificates = Certificates::of_all(&self.space, &self.references, &self.x, observer);
         let mut mended = 0;
         for round in 0..self.settings.repairs {
-            let failing = certificates.uncertified();
+            let failing = certificates.failing();
             if failing.is_empty() || observer.stop().is_some() {
                 break;
             }
@@ -255,10 +255,10 @@ impl Fit<'_> {
             mended = mended.max(failing.len());
         }
         if mended > 0 {
-            let left = certificates.uncertified().len();
+            let left = certificates.failing().len();
             self.notices.push(format!(
-                "{mended} elements could not be certified after the last stage; these and their neighbours were moved \
-                 on their own, with more quadrature points: {left} are left"
+                "{mended} elements were invalid between quadrature points after the last stage; these and their neighbours \
+                 were moved on their own, with more points: {left} are left"
             ));
             self.measure_energy()?;
         }

@@ -63,13 +63,9 @@ impl Certificates {
         matches!(self.verdicts[cell], Some(Verdict::Negative(..)))
     }
 
-    /// Elements that are judged and not certified.
-    pub fn uncertified(&self) -> Vec<usize> {
-        let verdicts = self.verdicts.iter().enumerate();
-        verdicts
-            .filter(|(_, verdict)| matches!(verdict, Some(Verdict::Negative(..) | Verdict::Undecided(_))))
-            .map(|(cell, _)| cell)
-            .collect()
+    /// Those elements.
+    pub fn failing(&self) -> Vec<usize> {
+        (0..self.verdicts.len()).filter(|&cell| self.fails(cell)).collect()
     }
 
     /// Numbers of elements that are certified, that fail, and that are neither.

@@ -10,6 +10,7 @@ use super::validity::Certificates;
 use super::{COUNTERS, adaptivity, invalid, orientation, quality, subdivision, untangle};
 use crate::energy::mapping::Density;
 use crate::fem::batches::{Batches, reference_volume, references_of_volume};
+use crate::fem::quadrature::{CellQuadrature, Rule};
 use crate::fem::space::{Kind, Space};
 use crate::fem::volume_energy::VolumeEnergy;
 use crate::linalg::vector3::Columns;
@@ -41,7 +42,9 @@ pub(super) struct Fit<'a> {
     pub(super) lambda: f64,
     pub(super) increases: usize,
     pub(super) stages: usize,
-    /// Those of the present map, once they are known.
+    /// Quadrature points added a direction, after elements came out invalid between the points.
+    pub(super) extra_points: usize,
+    /// Certificates of the present map, once they are known.
     pub(super) certificates: Option<Certificates>,
 }
 
@@ -194,6 +197,7 @@ impl<'a> Fit<'a> {
             lambda: settings.stages[0].lambda,
             increases: 0,
             stages: 0,
+            extra_points: 0,
             certificates: None,
         })
     }
@@ -207,12 +211,21 @@ impl<'a> Fit<'a> {
     }
 
     pub(super) fn volume_energy_of(&self, space: &Space, density: Density) -> Result<VolumeEnergy, Failure> {
-        let quadrature = |kind: Kind| {
-            let points = self.settings.quadrature_points(kind.order);
-            self.settings.rule.cell(kind.shape, points)
-        };
+        let quadrature = |kind: Kind| self.quadrature(kind);
         let batches = Batches::new(space, &self.references, &quadrature).map_err(invalid)?;
         VolumeEnergy::new(batches, density).map_err(invalid)
+    }
+
+    /// The points of a cell: those of the settings, in repairs more, with some on corners and edges, where elements fail
+    /// first.
+    pub(super) fn quadrature(&self, kind: Kind) -> CellQuadrature {
+        let settings = self.settings;
+        let points = settings.quadrature_points(kind.order);
+        if self.extra_points == 0 {
+            return settings.rule.cell(kind.shape, points);
+        }
+        let usual = settings.usual_points(Rule::Lobatto, kind.order);
+        Rule::Lobatto.cell(kind.shape, points.max(usual) + self.extra_points)
     }
 
     /// Intervals between samples along an edge of the boundary.

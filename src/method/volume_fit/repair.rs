@@ -1,21 +1,21 @@
 //! Mending single elements: those that are invalid somewhere move, and those around them; all others stay.
 //!
-//! The patch of elements has a volume energy of its own, with more quadrature points. In place of the surface energy
-//! stands its model about the boundary as it was: a parabola along the normals, and a flat one along the surface (see
-//! [`super::preconditioner`]). First determinants are turned, then the barrier spaces them out. Not guaranteed: success,
-//! and that the mended map is a minimum of the whole energy; it differs from one in the patch alone.
+//! The patch of elements has a volume energy of its own. In place of the surface energy stands its model about the
+//! boundary as it was: a parabola along the normals, and a flat one along the surface (see [`super::preconditioner`]).
+//! First determinants are turned, then the barrier spaces them out. Not guaranteed: success, and that the mended map is a
+//! minimum of the whole energy; it differs from one in the patch alone.
 
 use super::fit::Fit;
 use super::objective::Parts;
 use super::preconditioner::{self, Model};
 use super::surface_energy::SurfaceEnergy;
+use super::untangle::TANGLED;
 use super::untangle::{Quiet, Round, Turned, turn};
 use super::validity::Certificates;
 use super::{invalid, untangle};
 use crate::energy::mapping::Density;
 use crate::fem::batches::{Batches, reference_volume};
 use crate::fem::boundary::Boundary;
-use crate::fem::quadrature::Rule;
 use crate::fem::space::{Kind, Space};
 use crate::fem::volume_energy::VolumeEnergy;
 use crate::linalg::vector3::{Columns, subtract};
@@ -37,11 +37,8 @@ const SOFTNESS: f64 = 2.0;
 /// Quadrature points a direction that every repair has more than the one before.
 const EXTRA: usize = 3;
 
-/// How much more the volume energy counts in every repair than in the one before.
-const STRONGER: f64 = 10.0;
-
-/// Rings of elements about an invalid one that move at most.
-const MOST_RINGS: usize = 3;
+/// Elements are mended in their places when at most one in so many fails.
+const FEW: usize = 5;
 
 /// Elements that may move, as a mesh of their own.
 struct Patch {
@@ -59,27 +56,19 @@ struct Patch {
 }
 
 impl Patch {
-    /// The elements `seeds` with `rings` of elements about them that share a vertex.
-    fn around(fit: &Fit<'_>, seeds: &[usize], rings: usize) -> Result<Patch, Failure> {
+    /// The elements `seeds` and those that share a vertex with them.
+    fn around(fit: &Fit<'_>, seeds: &[usize]) -> Result<Patch, Failure> {
         let volume = &fit.volume;
-        let mut chosen = vec![false; volume.cells()];
+        let mut touched = vec![false; volume.points.len()];
         for &seed in seeds {
-            chosen[seed] = true;
-        }
-        for _ in 0..rings {
-            let mut touched = vec![false; volume.points.len()];
-            for (_, corners) in volume
+            volume
+                .cell(seed)
+                .1
                 .iter()
-                .zip(&chosen)
-                .filter(|(_, chosen)| **chosen)
-                .map(|(cell, _)| cell)
-            {
-                corners.iter().for_each(|&corner| touched[corner as usize] = true);
-            }
-            for ((_, corners), chosen) in volume.iter().zip(&mut chosen) {
-                *chosen |= corners.iter().any(|&corner| touched[corner as usize]);
-            }
+                .for_each(|&corner| touched[corner as usize] = true);
         }
+        let near = |(_, corners): (_, &[u32])| corners.iter().any(|&corner| touched[corner as usize]);
+        let chosen: Vec<bool> = volume.iter().map(near).collect();
         let cells: Vec<usize> = (0..volume.cells()).filter(|&cell| chosen[cell]).collect();
         // Vertices keep their order, and with it the orientation of edges and faces.
         let mut vertices: Vec<u32> = cells.iter().flat_map(|&cell| volume.cell(cell).1.to_vec()).collect();
@@ -128,14 +117,8 @@ impl Patch {
         })
     }
 
-    fn volume_energy(&self, fit: &Fit<'_>, extra: usize, density: Density) -> Result<VolumeEnergy, Failure> {
-        let quadrature = |kind: Kind| {
-            // Points on corners and edges, where elements fail first.
-            let rule = Rule::Lobatto;
-            let points = fit.settings.usual_points(rule, kind.order);
-            let given = fit.settings.points.unwrap_or(0);
-            rule.cell(kind.shape, points.max(given) + extra)
-        };
+    fn volume_energy(&self, fit: &Fit<'_>, density: Density) -> Result<VolumeEnergy, Failure> {
+        let quadrature = |kind: Kind| fit.quadrature(kind);
         let batches = Batches::new(&self.space, &self.references, &quadrature).map_err(invalid)?;
         VolumeEnergy::new(batches, density).map_err(invalid)
     }
@@ -213,52 +196,69 @@ impl Fit<'_> {
         volume: &VolumeEnergy,
         observer: &mut dyn Observer,
     ) -> Result<Option<StopReason>, Failure> {
-        for rings in 1..=MOST_RINGS {
-            let inverted = volume.inverted(&self.x);
-            if inverted.is_empty() {
-                return Ok(None);
-            }
+        let inverted = volume.inverted(&self.x);
+        if inverted.is_empty() {
+            return Ok(None);
+        }
+        if self.few(&inverted) {
             observer.phase("repair");
-            repair(self, &inverted, rings, 0, self.lambda, observer)?;
+            repair(self, &inverted, observer)?;
             if let Some(stop) = observer.stop() {
                 return Ok(Some(stop));
             }
-        }
-        if volume.value(&self.x).value.is_finite() {
-            return Ok(None);
+            if volume.value(&self.x).value.is_finite() {
+                return Ok(None);
+            }
         }
         untangle::untangle(self, observer)
     }
 
-    /// Mends the elements that fail between the points. `Some` when the observer asked to stop.
+    /// Whether so few elements fail that the rest may stay where it is.
+    fn few(&self, failing: &[usize]) -> bool {
+        failing.len() * FEW <= self.volume.cells()
+    }
+
+    /// Mends elements that fail between the points: a few in their places, or else, and where that was in vain, by going
+    /// on with the whole fit, with more points. `Some` when the observer asked to stop.
     pub(super) fn repair(&mut self, observer: &mut dyn Observer) -> Result<Option<StopReason>, Failure> {
         if self.settings.repairs == 0 {
             return Ok(None);
         }
         observer.phase("certify");
         let mut certificates = Certificates::of_all(&self.space, &self.references, &self.x, observer);
-        let mut mended = 0;
+        let before = certificates.failing().len();
         for round in 0..self.settings.repairs {
             let failing = certificates.failing();
             if failing.is_empty() || observer.stop().is_some() {
                 break;
             }
             observer.phase("repair");
-            let rings = (1 + round).min(MOST_RINGS);
-            let lambda = self.lambda * STRONGER.powi(round as i32);
-            let moved = repair(self, &failing, rings, EXTRA * (1 + round), lambda, observer)?;
-            if observer.stop().is_some() {
-                break;
+            self.extra_points += EXTRA;
+            if round == 0 && self.few(&failing) {
+                let moved = repair(self, &failing, observer)?;
+                observer.phase("certify");
+                certificates.renew(&moved, &self.space, &self.references, &self.x, observer);
+                continue;
             }
+            let kept = self.x.clone();
+            let last = self.settings.stages[self.settings.stages.len() - 1];
+            match self.stage(&last, observer) {
+                Err(failure) if failure.kind == TANGLED => {
+                    self.x = kept;
+                    self.notices.push(format!("a repair was given up: {}", failure.reason));
+                    break;
+                }
+                other => other?,
+            };
             observer.phase("certify");
-            certificates.renew(&moved, &self.space, &self.references, &self.x, observer);
-            mended = mended.max(failing.len());
+            certificates = Certificates::of_all(&self.space, &self.references, &self.x, observer);
         }
-        if mended > 0 {
-            let left = certificates.failing().len();
+        if before > 0 {
             self.notices.push(format!(
-                "{mended} elements were invalid between quadrature points after the last stage; these and their neighbours \
-                 were moved on their own, with more points: {left} are left"
+                "{before} elements were invalid between quadrature points after the last stage; after repairs with up to \
+                 {} points more a direction {} are left",
+                self.extra_points,
+                certificates.failing().len()
             ));
             self.measure_energy()?;
         }
@@ -295,19 +295,12 @@ impl Fit<'_> {
     }
 }
 
-/// Moves the elements `seeds` and `rings` of elements about them until determinants are positive at the quadrature's
-/// points, no fewer than usual and `extra` more a direction, and then to the least energy with this weight of the volume. Gives the elements that moved:
-/// none, and the map as it was, where determinants could not be turned or the observer asked to stop.
-fn repair(
-    fit: &mut Fit<'_>,
-    seeds: &[usize],
-    rings: usize,
-    extra: usize,
-    lambda: f64,
-    observer: &mut dyn Observer,
-) -> Result<Vec<usize>, Failure> {
-    let patch = Patch::around(fit, seeds, rings)?;
-    let barrier = patch.volume_energy(fit, extra, Density::new(fit.settings.energy))?;
+/// Moves the elements `seeds` and those about them until determinants are positive at the quadrature's points, and then to
+/// the least energy. Gives the elements that moved: none, and the map as it was, where determinants could not be turned or
+/// the observer asked to stop.
+fn repair(fit: &mut Fit<'_>, seeds: &[usize], observer: &mut dyn Observer) -> Result<Vec<usize>, Failure> {
+    let patch = Patch::around(fit, seeds)?;
+    let barrier = patch.volume_energy(fit, Density::new(fit.settings.energy))?;
     let own: f64 = (patch.mesh.iter().zip(&patch.references))
         .map(|((shape, _), reference)| reference_volume(shape, reference))
         .sum();
@@ -323,7 +316,7 @@ fn repair(
         samples: &anchors,
         x: &patch.x,
         references: &patch.references,
-        lambda,
+        lambda: fit.lambda,
         volume: fit.reference_volume,
         surface: fit.surface_factor(),
         anisotropy: fit.settings.anisotropy,
@@ -337,7 +330,7 @@ fn repair(
     let minimize = |volume: &VolumeEnergy, x: Vec<f64>, iterations: u64, observer: &mut dyn Observer| -> Solution {
         let mut objective = PatchObjective {
             volume,
-            lambda: lambda * own / fit.reference_volume,
+            lambda: fit.lambda * own / fit.reference_volume,
             boundary: &boundary,
             anchors: &anchors,
             blocks: &blocks,
@@ -368,7 +361,7 @@ fn repair(
         softness,
         least,
         |regularization, observer| {
-            let volume = patch.volume_energy(fit, extra, Density::of(regularization))?;
+            let volume = patch.volume_energy(fit, Density::of(regularization))?;
             let before = volume.value(&x).value;
             let solution = minimize(&volume, std::mem::take(&mut x), TURNING, observer);
             count(&solution);

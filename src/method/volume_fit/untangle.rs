@@ -23,6 +23,9 @@ const ITERATIONS: u64 = 60;
 /// Least share by which the regularized determinant falls from round to round.
 const DECREASE: f64 = 0.1;
 
+/// The kind of the failure to untangle.
+pub(super) const TANGLED: &str = "tangled";
+
 /// Passes on the wish to stop, and nothing else.
 pub(super) struct Quiet<'a>(pub(super) &'a mut dyn Observer);
 
@@ -153,7 +156,7 @@ pub(super) fn untangle(fit: &mut Fit<'_>, observer: &mut dyn Observer) -> Result
         Turned::Positive => Ok(None),
         Turned::Stopped(stop) => Ok(Some(stop)),
         Turned::Stuck(least) => Err(Failure {
-            kind: "tangled".to_string(),
+            kind: TANGLED.to_string(),
             reason: format!(
                 "elements stay inverted: the least determinant at a quadrature point is {least:.3e} after untangling; use \
                  a better template, more elements, or a larger lambda"

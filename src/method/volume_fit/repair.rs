@@ -250,6 +250,11 @@ impl Fit<'_> {
                 }
                 other => other?,
             };
+            if !self.volume_energy(&self.space)?.value(&self.x).value.is_finite() {
+                // Stopped while determinants were being turned.
+                self.x = kept;
+                break;
+            }
             observer.phase("certify");
             certificates = Certificates::of_all(&self.space, &self.references, &self.x, observer);
         }
@@ -266,8 +271,9 @@ impl Fit<'_> {
         Ok(observer.stop())
     }
 
-    /// The parts of the energy at the present map.
+    /// The parts of the energy at the present map, with the points of the stages.
     fn measure_energy(&mut self) -> Result<(), Failure> {
+        self.extra_points = 0;
         let volume = self.volume_energy(&self.space)?.value(&self.x);
         let order = self.space.orders.iter().copied().max().unwrap_or(1);
         let boundary = Boundary::new(&self.volume, &self.topology, &self.space, self.intervals(order));

@@ -6,7 +6,7 @@ use vargeo::metric::scaled_jacobian::ScaledJacobians;
 use vargeo::metric::{Metric, families};
 
 fn mesh() -> TetrahedralMesh {
-    let (points, cells) = super::sparse::grid(2);
+    let (points, cells) = crate::sparse::grid(2);
     let mut mesh = TetrahedralMesh { points, cells };
     for index in 0..mesh.cells.len() {
         if vargeo::mesh::determinant(mesh.corners(mesh.cells[index])) < 0.0 {

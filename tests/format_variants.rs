@@ -250,11 +250,7 @@ pub(crate) fn specimens() -> Vec<(String, Vec<u8>)> {
     }
     all.push(("binary.vtk".to_string(), vtk_5_binary()));
     all.push(("polygons.vtk".to_string(), vtk_3_binary()));
-    all.push((
-        "text.ply".to_string(),
-        (ply_header("ascii") + "0 0 0 0 0\n1 1 0 1 77 0\n2 0 1.5 2 77 78 0\n3 0 0 0 1\n9\n4 0 1 2 3 2.5\n")
-            .into_bytes(),
-    ));
+    all.push(("text.ply".to_string(), ply_text()));
     let facet = "facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\n";
     all.push((
         "text.stl".to_string(),
@@ -508,6 +504,11 @@ fn ply_header(form: &str) -> String {
     )
 }
 
+fn ply_text() -> Vec<u8> {
+    let body = "0 0 0 0 0\n1 1 0 1 77 0\n2 0 1.5 2 77 78 0\n3 0 0 0 1\n9\n4 0 1 2 3 2.5\n";
+    (ply_header("ascii") + body).into_bytes()
+}
+
 fn ply_binary(big: bool) -> Vec<u8> {
     let mut file = Bytes::new(big);
     file.text(&ply_header(if big {
@@ -535,9 +536,7 @@ fn ply_in_three_encodings_with_other_properties() {
         assert_eq!(content.cell_data, [field("area", 1, vec![2.5])]);
         assert_eq!(content.notices.len(), 2, "{:?}", content.notices);
     };
-    check(
-        (ply_header("ascii") + "0 0 0 0 0\n1 1 0 1 77 0\n2 0 1.5 2 77 78 0\n3 0 0 0 1\n9\n4 0 1 2 3 2.5\n").as_bytes(),
-    );
+    check(&ply_text());
     for big in [false, true] {
         check(&ply_binary(big));
     }

@@ -1,6 +1,8 @@
 //! What is made from a G1 surface holds it: control points, tessellations, Bézier cells, hexahedra and their certificates.
 
-use crate::g1_surface::{file, generated, length, network_of, patches, run, written};
+use crate::g1_surface::{file, network_of, patches, run, written};
+use crate::quadrilaterals::length;
+use crate::sample::{Noise, generated};
 use serde_json::json;
 use vargeo::fem::bernstein_hexahedron::{self as bernstein, ControlPoints, Verdict};
 use vargeo::linalg::vector3::subtract;
@@ -59,18 +61,12 @@ fn orders_of_bezier_points_visit_every_point_once() {
 #[test]
 fn the_certificate_agrees_with_sampling() {
     // A cube with its control points moved by growing amounts, always the same way.
-    let mut state = 1u64;
-    let mut random = || {
-        state = state
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        (state >> 11) as f64 / (1u64 << 53) as f64 - 0.5
-    };
+    let mut noise = Noise(1);
     let (mut positive, mut negative) = (0, 0);
     for trial in 0..24 {
         let amount = 0.1 + 0.05 * f64::from(trial % 12);
         let points: ControlPoints = std::array::from_fn(|index| {
-            [index / 25, index / 5 % 5, index % 5].map(|place| place as f64 / 4.0 + amount * random())
+            [index / 25, index / 5 % 5, index % 5].map(|place| place as f64 / 4.0 + 0.5 * amount * noise.number())
         });
         let mut least = f64::INFINITY;
         for index in 0..729 {

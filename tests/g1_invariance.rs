@@ -1,6 +1,8 @@
 //! A G1 surface depends on its mesh alone: not on numbering, place, size, other parts, threads or instruction sets.
 
-use crate::g1_surface::{file, generated, length, network_of, patches, run, small, written};
+use crate::g1_surface::{file, network_of, patches, run, small, written};
+use crate::quadrilaterals::length;
+use crate::sample::{generated, with_threads};
 use serde_json::json;
 use vargeo::linalg::processor::Processor;
 use vargeo::linalg::vector3::subtract;
@@ -152,14 +154,8 @@ fn every_part_is_turned_by_its_own_normals() {
 
 #[test]
 fn threads_do_not_change_a_bit() {
-    let with = |threads: usize| {
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build()
-            .expect("threads");
-        pool.install(|| run(generated("head", json!({ "cells": 8 })), json!({ "tessellation": 2 })).expect("a surface"))
-    };
-    let (one, three) = (with(1), with(3));
+    let head = || run(generated("head", json!({ "cells": 8 })), json!({ "tessellation": 2 })).expect("a surface");
+    let (one, three) = (with_threads(1, head), with_threads(3, head));
     let bits = |outcome: &Outcome| -> Vec<u64> { outcome.metrics.values().map(|value| value.to_bits()).collect() };
     assert_eq!(bits(&one), bits(&three));
     assert_eq!(one.mesh, three.mesh);

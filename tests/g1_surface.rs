@@ -1,5 +1,7 @@
 //! G1 surfaces against stored figures of an independent program, and the promises of the method.
 
+use crate::quadrilaterals::length;
+use crate::sample::{self, generated, model};
 use serde_json::{Value, json};
 use vargeo::linalg::vector3::{dot, subtract};
 use vargeo::mesh::generate::surface::{generate_surface, surfaces};
@@ -9,13 +11,9 @@ use vargeo::method::g1_surface::patch::{Operator, Patch, Reference, Solve, fit};
 use vargeo::method::g1_surface::{
     G1Surface, balance, continuity, edge_normals, enclosure, hermite, laplace_beltrami, least_squares, patch, surface,
 };
-use vargeo::method::model::{LoadedModel, Part};
-use vargeo::method::{Failure, Inputs, Method, Outcome};
+use vargeo::method::model::Part;
+use vargeo::method::{Failure, Outcome};
 use vargeo::optimize::Silent;
-
-pub(crate) fn length(vector: [f64; 3]) -> f64 {
-    dot(vector, vector).sqrt()
-}
 
 fn golden() -> Value {
     serde_json::from_str(include_str!("golden/g1_surface.json")).expect("the stored file is valid JSON")
@@ -66,28 +64,11 @@ pub(crate) fn small(name: &str) -> Value {
 }
 
 pub(crate) fn run(part: Part, settings: Value) -> Result<Outcome, Failure> {
-    let mut model = LoadedModel::default();
-    model.parts.insert("mesh".to_string(), part);
-    let inputs = Inputs {
-        settings: &settings,
-        model,
-    };
-    G1Surface.run(inputs, &mut Silent)
+    sample::run(&G1Surface, model([("mesh", part)]), settings)
 }
 
 pub(crate) fn file(text: &str) -> Part {
-    Part::File {
-        name: "mesh.obj".to_string(),
-        bytes: text.as_bytes().to_vec(),
-        parameters: json!({}),
-    }
-}
-
-pub(crate) fn generated(name: &str, parameters: Value) -> Part {
-    Part::Generated {
-        generator: name.to_string(),
-        parameters,
-    }
+    sample::file("mesh.obj", text)
 }
 
 #[test]
@@ -435,14 +416,7 @@ fn twists_at_the_corners_follow_from_the_normals() {
 #[test]
 fn quads_by_dual_contouring_lie_on_their_surface() {
     let with = |mesh: Part, surface: Part, settings: Value| {
-        let mut model = LoadedModel::default();
-        model.parts.insert("mesh".to_string(), mesh);
-        model.parts.insert("surface".to_string(), surface);
-        let inputs = Inputs {
-            settings: &settings,
-            model,
-        };
-        G1Surface.run(inputs, &mut Silent)
+        sample::run(&G1Surface, model([("mesh", mesh), ("surface", surface)]), settings)
     };
     let contour = || generated("dual-contouring", json!({ "cells": 10, "smoothing": 10 }));
     let torus = generated("torus", json!({ "around": 48, "across": 24 }));

@@ -197,7 +197,7 @@ fn a_changed_input_is_told() {
     let folder = folder();
     let path = folder.path().join("duck.mesh");
     std::fs::write(&path, "quack").unwrap();
-    let mut with_file = job("length");
+    let mut with_file = job(json!({ "behaviour": "length" }));
     let part = JobPart::File {
         sha256: sha256(b"quack"),
         format: "mesh".into(),

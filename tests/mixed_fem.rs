@@ -1,47 +1,28 @@
 //! Mixed finite elements against stored solutions of an independent program, and the promises of the method.
 
+use crate::sample::{self, model, with_threads};
 use serde_json::{Value, json};
 use vargeo::fem::surface::{SurfaceOperators, mean_edge_length};
 use vargeo::mesh::TriangleMesh;
 use vargeo::mesh::format;
 use vargeo::mesh::planar::{self, Domain, FAMILIES, Family};
 use vargeo::method::mixed_fem::MixedFem;
-use vargeo::method::model::{LoadedModel, Part};
-use vargeo::method::{Failure, Inputs, Method, Outcome};
-use vargeo::optimize::Silent;
+use vargeo::method::model::LoadedModel;
+use vargeo::method::{Failure, Method, Outcome};
 
 /// A generated model.
 pub(crate) fn generated(generator: &str, parameters: Value) -> LoadedModel {
-    let part = Part::Generated {
-        generator: generator.to_string(),
-        parameters,
-    };
-    LoadedModel {
-        parts: [("mesh".to_string(), part)].into(),
-    }
+    model([("mesh", sample::generated(generator, parameters))])
 }
 
 /// A model from the text of an OBJ file.
 pub(crate) fn file(text: &str) -> LoadedModel {
-    let part = Part::File {
-        name: "test.obj".to_string(),
-        bytes: text.as_bytes().to_vec(),
-        parameters: Value::Null,
-    };
-    LoadedModel {
-        parts: [("mesh".to_string(), part)].into(),
-    }
+    model([("mesh", sample::file("test.obj", text))])
 }
 
 pub(crate) fn run(model: LoadedModel, settings: Value) -> Result<Outcome, Failure> {
     assert_eq!(MixedFem.check(&settings), Vec::new(), "valid settings");
-    MixedFem.run(
-        Inputs {
-            settings: &settings,
-            model,
-        },
-        &mut Silent,
-    )
+    sample::run(&MixedFem, model, settings)
 }
 
 pub(crate) fn field(outcome: &Outcome, name: &str) -> Vec<f64> {
@@ -440,11 +421,7 @@ fn a_filled_hole_joins_smoothly_and_frames_share_a_factorization() {
 #[test]
 fn results_have_the_same_bits_with_any_number_of_threads() {
     let result = |threads: usize| {
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build()
-            .expect("a pool");
-        pool.install(|| {
+        with_threads(threads, || {
             let model = generated("square", json!({ "family": "minimum-angle-30", "cells": 24 }));
             let outcome = run(model, json!({ "equation": "triharmonic", "compare": true })).expect("a solution");
             let bits: Vec<u64> = outcome.metrics.values().map(|value| value.to_bits()).collect();

@@ -164,16 +164,10 @@ fn shell(script: &str, arguments: &[PathBuf]) -> Program {
 
 /// A plan of jobs with these settings.
 pub(crate) fn plan(settings: &[Value], limits: Limits, timing: Timing) -> Plan {
-    let jobs = settings.iter().enumerate().map(|(number, settings)| {
-        let job = Job {
-            record_schema: RECORD_SCHEMA,
-            method: "behaving".into(),
-            method_version: 1,
-            model: BTreeMap::new(),
-            settings: settings.clone(),
-        };
-        planned(&format!("job-{number}"), job, BTreeMap::new())
-    });
+    let jobs = settings
+        .iter()
+        .enumerate()
+        .map(|(number, settings)| planned(&format!("job-{number}"), job(settings.clone()), BTreeMap::new()));
     Plan {
         jobs: jobs.collect(),
         experiment: Experiment {
@@ -196,6 +190,16 @@ pub(crate) fn plan(settings: &[Value], limits: Limits, timing: Timing) -> Plan {
             origin: Default::default(),
         },
         notices: Vec::new(),
+    }
+}
+
+pub(crate) fn job(settings: Value) -> Job {
+    Job {
+        record_schema: RECORD_SCHEMA,
+        method: "behaving".into(),
+        method_version: 1,
+        model: BTreeMap::new(),
+        settings,
     }
 }
 
@@ -328,23 +332,16 @@ fn every_end_of_a_job_is_a_record_and_the_rest_go_on() {
     assert_eq!(kept.result.stop, "panicked");
     let cached: Vec<&str> = {
         plan.jobs.truncate(2);
-        plan.jobs
-            .push(planned("not-finite", job("not-finite"), BTreeMap::new()));
+        plan.jobs.push(planned(
+            "not-finite",
+            job(json!({ "behaviour": "not-finite" })),
+            BTreeMap::new(),
+        ));
         let run = run_plan(&plan, &options, &mut Nobody).unwrap();
         let cached = run.finished.iter().filter(|finished| finished.cached);
         cached.map(|finished| plan.jobs[finished.index].name.as_str()).collect()
     };
     assert_eq!(cached, ["job-0", "not-finite"]);
-}
-
-pub(crate) fn job(behaviour: &str) -> Job {
-    Job {
-        record_schema: RECORD_SCHEMA,
-        method: "behaving".into(),
-        method_version: 1,
-        model: BTreeMap::new(),
-        settings: json!({ "behaviour": behaviour }),
-    }
 }
 
 #[test]
@@ -510,8 +507,13 @@ fn a_method_gets_as_many_threads_as_were_asked_for() {
         interrupt: &Interrupt::default(),
         tell: &mut |message| told.push(message),
     };
-    let Ending::Computed(computed) = execute(&Behaving, &job("threads"), Default::default(), &BTreeMap::new(), bounds)
-    else {
+    let Ending::Computed(computed) = execute(
+        &Behaving,
+        &job(json!({ "behaviour": "threads" })),
+        Default::default(),
+        &BTreeMap::new(),
+        bounds,
+    ) else {
         panic!("it was cancelled");
     };
     assert_eq!(computed.result.metrics["value"], 3.0);

@@ -1,11 +1,12 @@
 //! Volumetric maps against stored figures of an independent program, and what the method takes and refuses.
 
+use crate::sample::{file, generated, model};
 use serde_json::{Value, json};
 use vargeo::energy::mapping::{Density, MappingEnergy};
 use vargeo::mesh::TetrahedralMesh;
 use vargeo::mesh::connectivity;
 use vargeo::mesh::target::Target;
-use vargeo::method::model::{LoadedModel, Part};
+use vargeo::method::model::LoadedModel;
 use vargeo::method::volume_map::problem::Problem;
 use vargeo::method::volume_map::settings::Settings;
 use vargeo::method::volume_map::{self, VolumeMap, harmonic, outcome, similarity};
@@ -20,35 +21,33 @@ fn points(value: &Value) -> Vec<[f64; 3]> {
     serde_json::from_value(value.clone()).expect("rows of three numbers")
 }
 
-fn settings(value: Value) -> Settings {
+pub(crate) fn settings(value: Value) -> Settings {
     Settings::resolve(&value).expect("valid settings")
 }
 
-/// The stored problem: a mesh of volume 1 and the places of its boundary on the unit cube.
-fn stored(chosen: &Settings) -> Problem {
+/// A mesh of volume 1.
+fn stored_mesh() -> TetrahedralMesh {
     let golden = golden();
-    let cells: Vec<[u32; 4]> = serde_json::from_value(golden["T"].clone()).expect("rows of four indices");
-    let mesh = TetrahedralMesh {
+    TetrahedralMesh {
         points: points(&golden["X"]),
-        cells,
-    };
+        cells: serde_json::from_value(golden["T"].clone()).expect("rows of four indices"),
+    }
+}
+
+/// The places of a mesh's boundary among those of all its vertices.
+pub(crate) fn target_of(mesh: &TetrahedralMesh, places: &[[f64; 3]]) -> Target {
     let boundary = connectivity::boundary(&mesh.cells, mesh.points.len());
-    let places = points(&golden["target"]);
-    let positions = boundary
-        .vertices
-        .iter()
-        .map(|&vertex| places[vertex as usize])
-        .collect();
-    Problem::from_parts(
-        mesh,
-        Target {
-            positions,
-            interior: None,
-        },
-        chosen,
-        Vec::new(),
-    )
-    .expect("a sound problem")
+    Target {
+        positions: boundary.vertices.iter().map(|&v| places[v as usize]).collect(),
+        interior: None,
+    }
+}
+
+/// The stored problem: a mesh and the places of its boundary on the unit cube.
+fn stored(chosen: &Settings) -> Problem {
+    let mesh = stored_mesh();
+    let target = target_of(&mesh, &points(&golden()["target"]));
+    Problem::from_parts(mesh, target, chosen, Vec::new()).expect("a sound problem")
 }
 
 pub(crate) fn close(name: &str, value: f64, expected: f64, tolerance: f64) {
@@ -60,14 +59,10 @@ pub(crate) fn close(name: &str, value: f64, expected: f64, tolerance: f64) {
 
 /// The standard case of published tables: a bumpy twisted grid onto a cube with swirled faces.
 pub(crate) fn onto_cube(generator: &str, parameters: Value, cube: Value) -> LoadedModel {
-    let mut model = LoadedModel::default();
-    let generated = |generator: &str, parameters: Value| Part::Generated {
-        generator: generator.into(),
-        parameters,
-    };
-    model.parts.insert("mesh".into(), generated(generator, parameters));
-    model.parts.insert("target".into(), generated("cube", cube));
-    model
+    model([
+        ("mesh", generated(generator, parameters)),
+        ("target", generated("cube", cube)),
+    ])
 }
 
 pub(crate) fn twisted_grid(divisions: u64) -> LoadedModel {
@@ -321,23 +316,10 @@ fn comparison_of_energies_holds_to_the_printed_digits() {
 #[test]
 fn affine_boundary_gives_the_affine_map_at_once() {
     let chosen = settings(json!({ "energy": "stretch", "rescale": false }));
-    let golden = golden();
-    let cells: Vec<[u32; 4]> = serde_json::from_value(golden["T"].clone()).unwrap();
-    let mesh = TetrahedralMesh {
-        points: points(&golden["X"]),
-        cells,
-    };
+    let mesh = stored_mesh();
     let affine = |[x, y, z]: [f64; 3]| [1.2 * x + 0.3 * y, -0.1 * x + 0.8 * y + 0.2 * z, 0.1 * x + 1.1 * z];
-    let boundary = connectivity::boundary(&mesh.cells, mesh.points.len());
-    let positions = boundary
-        .vertices
-        .iter()
-        .map(|&vertex| affine(mesh.points[vertex as usize]))
-        .collect();
-    let target = Target {
-        positions,
-        interior: None,
-    };
+    let places: Vec<[f64; 3]> = mesh.points.iter().map(|&point| affine(point)).collect();
+    let target = target_of(&mesh, &places);
     let problem = Problem::from_parts(mesh, target, &chosen, Vec::new()).expect("a sound problem");
     for energy in ["stretch", "symmetric-dirichlet", "arap", "mips", "lpm", "hencky"] {
         let chosen = settings(json!({ "energy": energy, "rescale": false }));
@@ -356,8 +338,7 @@ fn affine_boundary_gives_the_affine_map_at_once() {
     }
 }
 
-/// Derivatives of the weighted density by central differences, and the mean of stretch over the image as the Dirichlet
-/// energy of the inverse map.
+/// Every weighted density with its derivatives by central differences, and the energy of a map.
 #[test]
 fn target_weighting_is_the_mean_over_the_image() {
     use nalgebra::Matrix3;
@@ -432,11 +413,6 @@ fn starts_and_bad_models_are_told_apart() {
         close(start, metric(&outcome, "energy"), best, 1e-7);
     }
 
-    let text = |bytes: &[u8]| Part::File {
-        name: "target.txt".into(),
-        bytes: bytes.to_vec(),
-        parameters: json!({}),
-    };
     for (bytes, word) in [
         (b"0 0 0 0\n".as_slice(), "have no target"),
         (b"0 0 0\n", "line 1"),
@@ -444,7 +420,7 @@ fn starts_and_bad_models_are_told_apart() {
         (b"999999 0 0 0\n", "out of range"),
         (b"\xff\xfe\x00", "neither a mesh nor text"),
     ] {
-        model.parts.insert("target".into(), text(bytes));
+        model.parts.insert("target".into(), file("target.txt", bytes));
         let failure = map(model.clone(), json!({}), &mut Silent).expect_err("a bad target");
         assert_eq!(failure.kind, "invalid-input");
         assert!(
@@ -454,22 +430,11 @@ fn starts_and_bad_models_are_told_apart() {
         );
     }
     // A mirror image has no map without inversions at all.
-    let golden = golden();
-    let cells: Vec<[u32; 4]> = serde_json::from_value(golden["T"].clone()).unwrap();
-    let mesh = TetrahedralMesh {
-        points: points(&golden["X"]),
-        cells,
-    };
-    let boundary = connectivity::boundary(&mesh.cells, mesh.points.len());
-    let places = points(&golden["target"]);
-    let mirrored = |factor: f64| Target {
-        positions: boundary
-            .vertices
-            .iter()
-            .map(|&v| places[v as usize])
-            .map(|[x, y, z]| [factor * x, y, z])
-            .collect(),
-        interior: None,
+    let mesh = stored_mesh();
+    let places = points(&golden()["target"]);
+    let mirrored = |factor: f64| {
+        let places: Vec<[f64; 3]> = places.iter().map(|&[x, y, z]| [factor * x, y, z]).collect();
+        target_of(&mesh, &places)
     };
     for (factor, word) in [(-1.0, "inside out"), (0.0, "encloses the volume")] {
         let failure =

@@ -1,5 +1,6 @@
 //! The solvers of volumetric maps: why they stop, what they do where the energy gives no direction, the same bits.
 
+use crate::sample::with_threads;
 use crate::volume_map::{close, map, metric, onto_cube, twisted_grid};
 use serde_json::{Value, json};
 use std::cell::Cell;
@@ -9,11 +10,7 @@ use vargeo::optimize::{Iterate, Observer, Silent, StopReason};
 #[test]
 fn same_bits_with_any_number_of_threads() {
     let run = |threads: usize, chosen: Value| {
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build()
-            .expect("a pool");
-        pool.install(|| map(twisted_grid(6), chosen, &mut Silent).expect("a map"))
+        with_threads(threads, || map(twisted_grid(6), chosen, &mut Silent).expect("a map"))
     };
     for chosen in [
         json!({ "energy": "stretch" }),

@@ -2,13 +2,12 @@
 
 use crate::g1_surface::{file, network_of, patches, run, small, written};
 use crate::quadrilaterals::length;
-use crate::sample::{generated, with_threads};
+use crate::sample::{generated, metric_bits, with_threads};
 use serde_json::json;
 use vargeo::linalg::processor::Processor;
 use vargeo::linalg::vector3::subtract;
 use vargeo::mesh::format;
 use vargeo::mesh::generate::surface::generate_surface;
-use vargeo::method::Outcome;
 use vargeo::method::g1_surface::evaluation::{Derivatives, Evaluated, Places, evaluate};
 use vargeo::method::g1_surface::{control_net, surface};
 
@@ -156,7 +155,6 @@ fn every_part_is_turned_by_its_own_normals() {
 fn threads_do_not_change_a_bit() {
     let head = || run(generated("head", json!({ "cells": 8 })), json!({ "tessellation": 2 })).expect("a surface");
     let (one, three) = (with_threads(1, head), with_threads(3, head));
-    let bits = |outcome: &Outcome| -> Vec<u64> { outcome.metrics.values().map(|value| value.to_bits()).collect() };
-    assert_eq!(bits(&one), bits(&three));
+    assert_eq!(metric_bits(&one), metric_bits(&three));
     assert_eq!(one.mesh, three.mesh);
 }

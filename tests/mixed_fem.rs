@@ -1,6 +1,6 @@
 //! Mixed finite elements against stored solutions of an independent program, and the promises of the method.
 
-use crate::sample::{self, model, with_threads};
+use crate::sample::{self, metric_bits, model, with_threads};
 use serde_json::{Value, json};
 use vargeo::fem::surface::{SurfaceOperators, mean_edge_length};
 use vargeo::mesh::TriangleMesh;
@@ -424,8 +424,7 @@ fn results_have_the_same_bits_with_any_number_of_threads() {
         with_threads(threads, || {
             let model = generated("square", json!({ "family": "minimum-angle-30", "cells": 24 }));
             let outcome = run(model, json!({ "equation": "triharmonic", "compare": true })).expect("a solution");
-            let bits: Vec<u64> = outcome.metrics.values().map(|value| value.to_bits()).collect();
-            (bits, outcome.mesh)
+            (metric_bits(&outcome), outcome.mesh)
         })
     };
     let one = result(1);

@@ -46,6 +46,11 @@ pub(crate) fn run(method: &dyn Method, model: LoadedModel, settings: Value) -> R
     method.run(inputs, &mut Silent)
 }
 
+/// All figures of an outcome, to the bit.
+pub(crate) fn metric_bits(outcome: &Outcome) -> Vec<u64> {
+    outcome.metrics.values().map(|value| value.to_bits()).collect()
+}
+
 /// What comes out with so many threads.
 pub(crate) fn with_threads<R: Send>(threads: usize, run: impl FnOnce() -> R + Send) -> R {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();

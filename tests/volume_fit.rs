@@ -1,6 +1,6 @@
-//! Fits of small volumes: what is promised of them, templates by recipes, and certificates against stored verdicts.
+//! Fits of small volumes: what is promised of them, templates by recipes and from files, input that is refused.
 
-use crate::sample::{self, file, generated, model, with_threads};
+use crate::sample::{self, file, generated, metric_bits, model, with_threads};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use vargeo::fem::basis;
@@ -53,14 +53,7 @@ fn a_fit_is_valid_falls_in_every_stage_and_is_the_same_with_any_number_of_thread
     );
     let other = run(2);
     assert_eq!(outcome.mesh, other.mesh);
-    let bits = |outcome: &Outcome| {
-        outcome
-            .metrics
-            .values()
-            .map(|value| value.to_bits())
-            .collect::<Vec<_>>()
-    };
-    assert_eq!(bits(&outcome), bits(&other));
+    assert_eq!(metric_bits(&outcome), metric_bits(&other));
 }
 
 #[test]

@@ -8,9 +8,7 @@
 use super::fit::Fit;
 use super::objective::Parts;
 use super::preconditioner::{self, Model};
-use super::surface_energy::SurfaceEnergy;
-use super::untangle::TANGLED;
-use super::untangle::{Quiet, Round, Turned, turn};
+use super::untangle::{Quiet, Round, TANGLED, Turned, turn};
 use super::validity::Certificates;
 use super::{invalid, untangle};
 use crate::energy::mapping::Density;
@@ -135,20 +133,11 @@ struct PatchObjective<'a> {
     /// One over the diagonal of a model of the Hessian; 0 for nodes that stay.
     inverse: &'a [f64],
     samples: Vec<[f64; 3]>,
-    room: Vec<f64>,
 }
 
 impl Objective for PatchObjective<'_> {
     fn dimension(&self) -> usize {
         3 * self.inverse.len()
-    }
-
-    fn value(&mut self, x: &[f64]) -> f64 {
-        let mut gradient = std::mem::take(&mut self.room);
-        gradient.resize(x.len(), 0.0);
-        let value = self.gradient(x, &mut gradient);
-        self.room = gradient;
-        value
     }
 
     fn gradient(&mut self, x: &[f64], gradient: &mut [f64]) -> f64 {
@@ -275,21 +264,11 @@ impl Fit<'_> {
     fn measure_energy(&mut self) -> Result<(), Failure> {
         self.extra_points = 0;
         let volume = self.volume_energy(&self.space)?.value(&self.x);
-        let order = self.space.orders.iter().copied().max().unwrap_or(1);
-        let boundary = Boundary::new(&self.volume, &self.topology, &self.space, self.intervals(order));
+        let boundary = self.boundary(&self.space);
         let mut samples = Vec::new();
         boundary.positions(&self.x, &mut samples);
         let mut surface = 0.0;
-        if self.surface_factor() > 0.0 {
-            let mut energy = SurfaceEnergy::new(
-                &samples,
-                &boundary.triangles,
-                &self.target,
-                self.settings.terms,
-                self.settings.anisotropy,
-                self.scale,
-            )
-            .map_err(invalid)?;
+        if let Some(mut energy) = self.surface_energy(&boundary, &samples)? {
             surface = energy.gradient(&samples, &mut vec![[0.0; 3]; samples.len()]);
         }
         self.last = Parts {
@@ -310,8 +289,8 @@ fn repair(fit: &mut Fit<'_>, seeds: &[usize], observer: &mut dyn Observer) -> Re
     let own: f64 = (patch.mesh.iter().zip(&patch.references))
         .map(|((shape, _), reference)| reference_volume(shape, reference))
         .sum();
-    let order = patch.space.orders.iter().copied().max().unwrap_or(1);
-    let boundary = Boundary::new(&patch.mesh, &patch.topology, &patch.space, fit.intervals(order));
+    let intervals = fit.intervals(patch.space.highest_order());
+    let boundary = Boundary::new(&patch.mesh, &patch.topology, &patch.space, intervals);
     let mut anchors = Vec::new();
     boundary.positions(&patch.x, &mut anchors);
     let model = Model {
@@ -342,7 +321,6 @@ fn repair(fit: &mut Fit<'_>, seeds: &[usize], observer: &mut dyn Observer) -> Re
             blocks: &blocks,
             inverse: &inverse,
             samples: Vec::new(),
-            room: Vec::new(),
         };
         let lbfgs = Lbfgs {
             stopping: Stopping {

@@ -1,4 +1,4 @@
-//! What is made from a G1 surface holds it: control points, tessellations, Bézier cells, hexahedra and their certificates.
+//! What is made from a G1 surface holds it: control points, tessellations, Bézier cells, hexahedra with certificates.
 
 use crate::g1_surface::{file, network_of, patches, run, written};
 use crate::quadrilaterals::length;

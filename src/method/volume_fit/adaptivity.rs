@@ -173,7 +173,7 @@ fn raised_by_energy(fit: &Fit<'_>, adaptive: &Adaptive) -> Result<Option<Vec<usi
         })
         .collect();
     let total: f64 = indicators.iter().map(|entry| entry.0).sum();
-    let energy = fit.last.surface + fit.lambda * fit.last.volume;
+    let energy = fit.last.total(fit.lambda);
     if !(total > 1e-6 * energy) {
         return Ok(None);
     }

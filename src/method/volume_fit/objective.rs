@@ -17,6 +17,13 @@ pub struct Parts {
     pub least_determinant: f64,
 }
 
+impl Parts {
+    /// The energy with this weight of the volume's.
+    pub fn total(&self, lambda: f64) -> f64 {
+        self.surface + lambda * self.volume
+    }
+}
+
 /// The energy of one stage.
 pub struct FitObjective<'a> {
     pub volume: &'a VolumeEnergy,
@@ -114,6 +121,6 @@ impl FitObjective<'_> {
             self.boundary.add_gradient(&self.forces, gradient);
         }
         self.latest.set(parts);
-        parts.surface + self.lambda * parts.volume
+        parts.total(self.lambda)
     }
 }

@@ -35,6 +35,9 @@ const SOFTNESS: f64 = 2.0;
 /// Quadrature points a direction that every repair has more than the one before.
 const EXTRA: usize = 3;
 
+/// A map with fewer failing elements is not taken when its energy is this much higher.
+const DEARER: f64 = 2.0;
+
 /// Elements are mended in their places when at most one in so many fails.
 const FEW: usize = 5;
 
@@ -213,6 +216,7 @@ impl Fit<'_> {
         if self.settings.repairs == 0 {
             return Ok(None);
         }
+        let energy = self.last.total(self.lambda);
         observer.phase("certify");
         let mut certificates = Certificates::of_all(&self.space, &self.references, &self.x, observer);
         let before = certificates.failing().len();
@@ -223,29 +227,27 @@ impl Fit<'_> {
             }
             observer.phase("repair");
             self.extra_points += EXTRA;
-            if round == 0 && self.few(&failing) {
-                let moved = repair(self, &failing, observer)?;
-                observer.phase("certify");
-                certificates.renew(&moved, &self.space, &self.references, &self.x, observer);
-                continue;
-            }
             let kept = self.x.clone();
-            let last = self.settings.stages[self.settings.stages.len() - 1];
-            match self.stage(&last, observer) {
-                Err(failure) if failure.kind == TANGLED => {
-                    self.x = kept;
-                    self.notices.push(format!("a repair was given up: {}", failure.reason));
+            let in_place = round == 0 && self.few(&failing);
+            let moved = if in_place {
+                repair(self, &failing, observer)?
+            } else {
+                self.repair_all(observer)?
+            };
+            observer.phase("certify");
+            let mut judged = certificates.clone();
+            judged.renew(&moved, &self.space, &self.references, &self.x, observer);
+            let better = observer.stop().is_none()
+                && judged.failing().len() < failing.len()
+                && self.energy()?.total(self.lambda) < DEARER * energy;
+            if better {
+                certificates = judged;
+            } else {
+                self.x = kept;
+                if !in_place {
                     break;
                 }
-                other => other?,
-            };
-            if !self.volume_energy(&self.space)?.value(&self.x).value.is_finite() {
-                // Stopped while determinants were being turned.
-                self.x = kept;
-                break;
             }
-            observer.phase("certify");
-            certificates = Certificates::of_all(&self.space, &self.references, &self.x, observer);
         }
         if before > 0 {
             self.notices.push(format!(
@@ -254,16 +256,31 @@ impl Fit<'_> {
                 self.extra_points,
                 certificates.failing().len()
             ));
-            self.measure_energy()?;
+            self.extra_points = 0;
+            self.last = self.energy()?;
         }
         self.certificates = Some(certificates);
         Ok(observer.stop())
     }
 
+    /// Goes on with the last stage. Gives all elements: none where they got tangled.
+    fn repair_all(&mut self, observer: &mut dyn Observer) -> Result<Vec<usize>, Failure> {
+        let last = self.settings.stages[self.settings.stages.len() - 1];
+        match self.stage(&last, observer) {
+            Ok(_) => Ok((0..self.volume.cells()).collect()),
+            Err(failure) if failure.kind == TANGLED => {
+                self.notices.push(format!("a repair was given up: {}", failure.reason));
+                Ok(Vec::new())
+            }
+            Err(failure) => Err(failure),
+        }
+    }
+
     /// The parts of the energy at the present map, with the points of the stages.
-    fn measure_energy(&mut self) -> Result<(), Failure> {
-        self.extra_points = 0;
+    fn energy(&mut self) -> Result<Parts, Failure> {
+        let extra = std::mem::take(&mut self.extra_points);
         let volume = self.volume_energy(&self.space)?.value(&self.x);
+        self.extra_points = extra;
         let boundary = self.boundary(&self.space);
         let mut samples = Vec::new();
         boundary.positions(&self.x, &mut samples);
@@ -271,12 +288,11 @@ impl Fit<'_> {
         if let Some(mut energy) = self.surface_energy(&boundary, &samples)? {
             surface = energy.gradient(&samples, &mut vec![[0.0; 3]; samples.len()]);
         }
-        self.last = Parts {
+        Ok(Parts {
             surface,
             volume: volume.value,
             least_determinant: volume.least_determinant,
-        };
-        Ok(())
+        })
     }
 }
 

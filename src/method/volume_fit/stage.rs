@@ -101,7 +101,6 @@ impl Fit<'_> {
         mut chart: Option<(&Chart, &mut Vec<f64>)>,
         observer: &mut dyn Observer,
     ) -> Result<(StopReason, String), Failure> {
-        observer.phase(&format!("stage {}", self.stages));
         let settings = self.settings;
         self.lambda = stage.lambda;
         let order = self.space.highest_order();
@@ -113,6 +112,7 @@ impl Fit<'_> {
         {
             return Ok((stop, "stopped from outside while elements were untangled".to_string()));
         }
+        observer.phase(&format!("stage {}", self.stages));
         let boundary = self.boundary(&self.space);
         let mut samples = Vec::new();
         boundary.positions(&self.x, &mut samples);

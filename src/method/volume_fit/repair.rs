@@ -220,6 +220,8 @@ impl Fit<'_> {
         observer.phase("certify");
         let mut certificates = Certificates::of_all(&self.space, &self.references, &self.x, observer);
         let before = certificates.failing().len();
+        // The best so far; the rounds go on from where they are.
+        let mut best = (certificates.clone(), self.x.clone());
         for round in 0..self.settings.repairs {
             let failing = certificates.failing();
             if failing.is_empty() || observer.stop().is_some() {
@@ -227,28 +229,27 @@ impl Fit<'_> {
             }
             observer.phase("repair");
             self.extra_points += EXTRA;
-            let kept = self.x.clone();
             let in_place = round == 0 && self.few(&failing);
             let moved = if in_place {
                 repair(self, &failing, observer)?
             } else {
                 self.repair_all(observer)?
             };
-            observer.phase("certify");
-            let mut judged = certificates.clone();
-            judged.renew(&moved, &self.space, &self.references, &self.x, observer);
-            let better = observer.stop().is_none()
-                && judged.failing().len() < failing.len()
-                && self.energy()?.total(self.lambda) < DEARER * energy;
-            if better {
-                certificates = judged;
-            } else {
-                self.x = kept;
-                if !in_place {
-                    break;
+            let dear = !(self.energy()?.total(self.lambda) < DEARER * energy);
+            if dear || observer.stop().is_some() {
+                (certificates, self.x) = best.clone();
+                if in_place {
+                    continue;
                 }
+                break;
+            }
+            observer.phase("certify");
+            certificates.renew(&moved, &self.space, &self.references, &self.x, observer);
+            if observer.stop().is_none() && certificates.failing().len() < best.0.failing().len() {
+                best = (certificates.clone(), self.x.clone());
             }
         }
+        (certificates, self.x) = best;
         if before > 0 {
             self.notices.push(format!(
                 "{before} elements were invalid between quadrature points after the last stage; after repairs with up to \

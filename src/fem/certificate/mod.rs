@@ -217,7 +217,8 @@ impl Certifier {
         if self.polynomial(order) {
             order
         } else {
-            (order + 3).max(6)
+            // Above, conversions round more than is gained; more cuts do the same.
+            (order + 3).clamp(6, 16)
         }
     }
 

@@ -1,7 +1,8 @@
 //! Bernstein coefficients of the position of a cell whose functions are polynomials.
 //!
 //! Lines, triangles and tetrahedra have conversions of their own; coefficients of products are contracted factor by
-//! factor. Guaranteed: a bound of the coefficients' error, which covers the conversions' rounding by an estimate.
+//! factor. Guaranteed: a bound of the position's error. It covers the conversions' rounding by an estimate, for lines of the
+//! function that the coefficients stand for rather than of each coefficient.
 
 use super::{Certifier, rounding};
 use crate::fem::space::Kind;

@@ -274,8 +274,9 @@ pub static FIELDS: &[Field] = &[
         name: "repairs",
         kind: Kind::Integer { min: 0, max: 10 },
         default: Default::Absent,
-        doc: "How often, at most, elements that are invalid between quadrature points at the end are moved on their own, with \
-              their neighbours and more points every time. Preset best: 3, paper: 0.",
+        doc: "How often, at most, elements that are invalid between quadrature points at the end are mended, with more points \
+              every time: first, if at most one in five fails, on their own with their neighbours, then by going on with the \
+              whole fit. The map with the fewest failing elements is kept. Preset best: 3, paper: 0.",
     },
     Field {
         name: "subdivision_levels",

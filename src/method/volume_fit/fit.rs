@@ -299,7 +299,8 @@ impl<'a> Fit<'a> {
         drop(start);
         let mut stop = StopReason::Converged;
         let mut reason = String::new();
-        if !evaluation.value.is_finite() && self.settings.untangle {
+        // Nothing but the layers holds a shell's surface in its place.
+        if !evaluation.value.is_finite() && self.settings.untangle && self.shell.is_none() {
             if let Some(interrupted) = untangle::untangle(self, observer)? {
                 return self.finish(
                     interrupted,

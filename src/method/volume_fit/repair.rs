@@ -29,8 +29,9 @@ const SPACING: u64 = 150;
 /// Share of the energy below which its change ends a minimization.
 const CHANGE: f64 = 1e-6;
 
-/// The regularization at the start, in multiples of the least determinant.
+/// The regularization at the start, in multiples of the least determinant, and at least.
 const SOFTNESS: f64 = 2.0;
+const SOFTEST: f64 = 1e-6;
 
 /// Quadrature points a direction that every repair has more than the one before.
 const EXTRA: usize = 3;
@@ -235,7 +236,13 @@ impl Fit<'_> {
             } else {
                 self.repair_all(observer)?
             };
-            let dear = !(self.energy()?.total(self.lambda) < DEARER * energy);
+            let now = self.energy()?.total(self.lambda);
+            let dear = !(now < DEARER * energy);
+            if dear && !moved.is_empty() {
+                self.notices.push(format!(
+                    "a repair was not taken: the energy rose from {energy:.3e} to {now:.3e}"
+                ));
+            }
             if dear || observer.stop().is_some() {
                 (certificates, self.x) = best.clone();
                 if in_place {
@@ -257,8 +264,11 @@ impl Fit<'_> {
                 self.extra_points,
                 certificates.failing().len()
             ));
+            let fine = self.energy()?;
             self.extra_points = 0;
-            self.last = self.energy()?;
+            let usual = self.energy()?;
+            // What was mended at more points may still fail at the usual ones.
+            self.last = if usual.volume.is_finite() { usual } else { fine };
         }
         self.certificates = Some(certificates);
         Ok(observer.stop())
@@ -277,11 +287,9 @@ impl Fit<'_> {
         }
     }
 
-    /// The parts of the energy at the present map, with the points of the stages.
-    fn energy(&mut self) -> Result<Parts, Failure> {
-        let extra = std::mem::take(&mut self.extra_points);
+    /// The parts of the energy at the present map.
+    fn energy(&self) -> Result<Parts, Failure> {
         let volume = self.volume_energy(&self.space)?.value(&self.x);
-        self.extra_points = extra;
         let boundary = self.boundary(&self.space);
         let mut samples = Vec::new();
         boundary.positions(&self.x, &mut samples);
@@ -357,7 +365,7 @@ fn repair(fit: &mut Fit<'_>, seeds: &[usize], observer: &mut dyn Observer) -> Re
         counted[1] += solution.counters.evaluations;
     };
     let least = barrier.value(&x).least_determinant;
-    let softness = (SOFTNESS * least.abs()).min(1.0);
+    let softness = (SOFTNESS * least.abs()).clamp(SOFTEST, 1.0);
     let turned = turn(
         softness,
         least,

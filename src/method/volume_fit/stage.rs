@@ -6,6 +6,7 @@ use super::invalid;
 use super::objective::{FitObjective, Parts};
 use super::preconditioner::{Model, Preconditioner};
 use super::settings::Stage;
+use super::untangle::TANGLED;
 use crate::method::Failure;
 use crate::optimize::lbfgs::Lbfgs;
 use crate::optimize::{Iterate, Observer, StopReason, Stopping};
@@ -105,9 +106,20 @@ impl Fit<'_> {
         self.lambda = stage.lambda;
         let order = self.space.highest_order();
         let volume = self.volume_energy(&self.space)?;
-        // Unknowns of a chart have to be turned by what made them.
-        if settings.untangle
-            && chart.is_none()
+        if chart.is_some() {
+            // Nodes are turned one by one, and what stands for many of them is not.
+            let inverted = volume.inverted(&self.x).len();
+            if inverted > 0 {
+                return Err(Failure {
+                    kind: TANGLED.to_string(),
+                    reason: format!(
+                        "{inverted} elements are inverted at the start of stage {}, whose nodes follow control points or \
+                         layers and cannot be turned one by one; repair the template, or use more elements",
+                        self.stages
+                    ),
+                });
+            }
+        } else if settings.untangle
             && let Some(stop) = self.mend(&volume, observer)?
         {
             return Ok((stop, "stopped from outside while elements were untangled".to_string()));

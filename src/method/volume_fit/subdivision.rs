@@ -35,6 +35,8 @@ pub(super) fn run(
             "{levels} levels of this template have {cells} hexahedra, more than {MOST_CELLS}; lower subdivision_levels"
         )));
     }
+    // Where the template was untangled, as that left it.
+    place_vertices(fit);
     let mut outcome = (StopReason::Converged, String::new());
     for level in 0..levels {
         let subdivided = subdivide(&fit.volume, &tagged).map_err(invalid)?;
@@ -58,9 +60,14 @@ pub(super) fn run(
                 return Ok(outcome);
             }
         }
-        for (point, place) in fit.volume.points.iter_mut().zip(fit.x.as_chunks::<3>().0) {
-            *point = *place;
-        }
+        place_vertices(fit);
     }
     Ok(outcome)
+}
+
+/// Moves the mesh's vertices to their nodes.
+fn place_vertices(fit: &mut Fit<'_>) {
+    for (point, place) in fit.volume.points.iter_mut().zip(fit.x.as_chunks::<3>().0) {
+        *point = *place;
+    }
 }

@@ -121,7 +121,7 @@ pub fn of_boundary(surface: TriangleMesh) -> Target {
     Target {
         surface: surface.clone(),
         clean: surface,
-        notices: vec!["no target is given: the template's own boundary is".to_string()],
+        notices: vec!["no target is given: the template's own boundary is the target".to_string()],
         ..Target::default()
     }
 }

@@ -6,7 +6,7 @@ use vargeo::mesh::generate::template::{generate_template, templates};
 use vargeo::mesh::surface::Surface;
 use vargeo::method::model::{LoadedModel, Part};
 use vargeo::method::surface_fit::objective::{FitObjective, Target};
-use vargeo::method::surface_fit::settings::Settings;
+use vargeo::method::surface_fit::settings::{Settings, Stage};
 use vargeo::method::surface_fit::{SurfaceFit, fitted_mesh, sampling};
 use vargeo::method::{Inputs, Method, Outcome};
 use vargeo::optimize::{Objective, Silent};
@@ -35,18 +35,26 @@ fn fit(target: Part, template: Part, settings: Value) -> Result<Outcome, String>
 fn gradient_is_that_of_the_value() {
     let target = generate_shape("flower", &json!({ "triangles": 300, "petals": 3 })).unwrap();
     let mut control = generate_template("box", &json!({ "quads": 24 }), [[-0.9; 3], [0.95; 3]]).unwrap();
-    for (index, x) in control.points.as_flattened_mut().iter_mut().enumerate() {
-        *x += 0.05 * (index as f64 * 12.9898).sin();
-    }
-    for compatibility in [0.0, 0.05] {
+    let regular = control.points.clone();
+    for (compatibility, unfolding) in [(0.0, 0.0), (0.05, 0.0), (0.0, 30.0)] {
         for s in [1.0, 5.0] {
+            // Far enough from regular to fold where unfolding is asked for.
+            let noise = if unfolding > 0.0 { 0.5 } else { 0.05 };
+            let points = regular.as_flattened().iter().enumerate();
+            let points: Vec<f64> = points
+                .map(|(index, x)| x + noise * (index as f64 * 12.9898).sin())
+                .collect();
+            control.points = points.as_chunks().0.to_vec();
             let settings = Settings::resolve(&json!({
                 "subdivisions": 1, "anisotropy": s, "regularization": 0.01, "compatibility": compatibility
             }))
             .unwrap();
             let (fitted, map) = fitted_mesh(&control, &[], &settings);
             let samples = sampling::sample(&target, fitted.points.len(), &settings, &mut Silent).unwrap();
-            let stage = settings.stages()[0];
+            let stage = Stage {
+                unfolding,
+                ..settings.stages()[0]
+            };
             let mut objective = FitObjective::new(
                 Target::Surface(&target),
                 &samples,
@@ -60,6 +68,7 @@ fn gradient_is_that_of_the_value() {
             let x = control.points.as_flattened().to_vec();
             let mut gradient = vec![0.0; x.len()];
             objective.gradient(&x, &mut gradient);
+            assert_eq!(objective.latest().get().folding > 0.0, unfolding > 0.0);
             let direction: Vec<f64> = (0..x.len()).map(|index| (index as f64 * 78.233).cos()).collect();
             let slope: f64 = gradient.iter().zip(&direction).map(|(g, d)| g * d).sum();
             let step = 1e-6;
@@ -70,7 +79,7 @@ fn gradient_is_that_of_the_value() {
             let difference = (at(step) - at(-step)) / (2.0 * step);
             assert!(
                 (slope / difference - 1.0).abs() < 1e-5,
-                "s = {s}, compatibility {compatibility}: {slope} against {difference}"
+                "s = {s}, compatibility {compatibility}, unfolding {unfolding}: {slope} against {difference}"
             );
         }
     }

@@ -33,7 +33,8 @@ use crate::optimize::{Counters, Objective, Observer, StopReason, Stopping};
 use objective::FitObjective;
 use problem::Problem;
 use serde_json::Value;
-use settings::Settings;
+use settings::{Settings, Stage};
+use std::collections::VecDeque;
 use trace::{Recorder, Trace};
 
 /// The method `surface-fit`.
@@ -45,7 +46,7 @@ impl Method for SurfaceFit {
     }
 
     fn version(&self) -> u32 {
-        4
+        5
     }
 
     fn summary(&self) -> &'static str {
@@ -152,7 +153,17 @@ pub fn run(problem: &Problem, settings: &Settings, observer: &mut dyn Observer) 
     check_size(&problem.template, settings)?;
     let mut control = problem.template.clone();
     let mut creases = control.creases(settings.crease_angle);
-    let stages = settings.stages();
+    let stages = if settings.approach.is_near(problem.near) {
+        settings.stages_from_near()
+    } else {
+        settings.stages()
+    };
+    if stages != settings.stages() {
+        notices.push(format!(
+            "the template starts near the target: all stages have the last one's regularization, {}, at most",
+            stages[stages.len() - 1].regularization
+        ));
+    }
     let mut trace = Trace::default();
     let mut counters = Counters::default();
     let mut minimizations = 0;
@@ -167,7 +178,7 @@ pub fn run(problem: &Problem, settings: &Settings, observer: &mut dyn Observer) 
     let mut samples = take_samples(fitted.points.len(), observer)?;
     let mut parts = objective::Parts::default();
     let mut reached = stages[0];
-    let total = (stages.len() + settings.refinements) as u64;
+    let mut total = (stages.len() + settings.refinements) as u64;
     'rounds: for round in 0..=settings.refinements {
         if round > 0 {
             observer.phase("refine");
@@ -192,7 +203,8 @@ pub fn run(problem: &Problem, settings: &Settings, observer: &mut dyn Observer) 
             stages[first],
         )?;
         let mut x = control.points.as_flattened().to_vec();
-        for &stage in &stages[first..] {
+        let mut left: VecDeque<Stage> = stages[first..].iter().copied().collect();
+        while let Some(stage) = left.pop_front() {
             reached = stage;
             objective.set_stage(stage);
             let lbfgs = Lbfgs {
@@ -232,6 +244,24 @@ pub fn run(problem: &Problem, settings: &Settings, observer: &mut dyn Observer) 
                 StopReason::TimeLimit | StopReason::Cancelled | StopReason::NotFinite
             ) {
                 break;
+            }
+            let factor = match stage.unfolding {
+                0.0 => settings.unfolding,
+                factor => 10.0 * factor,
+            };
+            if left.is_empty()
+                && round == settings.refinements
+                && settings.unfolding > 0.0
+                && factor <= 10.0 * settings.unfolding
+            {
+                map.apply(x.as_chunks().0, &mut fitted.points);
+                if fitted.scaled_jacobians().iter().any(|&jacobian| !(jacobian > 0.0)) {
+                    total += 1;
+                    left.push_back(Stage {
+                        unfolding: factor,
+                        ..stage
+                    });
+                }
             }
         }
         objective.value(&x);

@@ -121,6 +121,11 @@ pub fn fitted_mesh(control: &Surface, creases: &[[u32; 2]], settings: &Settings)
     (fitted, map)
 }
 
+/// Most stages that unfold,
+const UNFOLDINGS: i32 = 2;
+/// and the factor by which each counts folded corners more than the one before.
+const MORE: f64 = 10.0;
+
 /// Most faces of a fitted mesh.
 const MOST_FACES: f64 = 2e7;
 
@@ -178,6 +183,7 @@ pub fn run(problem: &Problem, settings: &Settings, observer: &mut dyn Observer) 
     let mut samples = take_samples(fitted.points.len(), observer)?;
     let mut parts = objective::Parts::default();
     let mut reached = stages[0];
+    let mut unfoldings = 0;
     let mut total = (stages.len() + settings.refinements) as u64;
     'rounds: for round in 0..=settings.refinements {
         if round > 0 {
@@ -230,6 +236,22 @@ pub fn run(problem: &Problem, settings: &Settings, observer: &mut dyn Observer) 
             counters += solution.counters;
             minimizations += 1;
             (stop, reason) = (solution.stop, solution.reason);
+            let has_ended = matches!(
+                stop,
+                StopReason::TimeLimit | StopReason::Cancelled | StopReason::NotFinite
+            );
+            let is_last = !has_ended && left.is_empty() && round == settings.refinements;
+            if is_last && settings.unfolding > 0.0 && unfoldings < UNFOLDINGS {
+                map.apply(x.as_chunks().0, &mut fitted.points);
+                if fitted.scaled_jacobians().iter().any(|&jacobian| !(jacobian > 0.0)) {
+                    left.push_back(Stage {
+                        unfolding: settings.unfolding * MORE.powi(unfoldings),
+                        ..stage
+                    });
+                    unfoldings += 1;
+                    total += 1;
+                }
+            }
             if total > 1 {
                 reason = format!("stage {minimizations} of {total}: {reason}");
             }
@@ -239,29 +261,8 @@ pub fn run(problem: &Problem, settings: &Settings, observer: &mut dyn Observer) 
                     minimizations, settings.iteration_limit
                 ));
             }
-            if matches!(
-                stop,
-                StopReason::TimeLimit | StopReason::Cancelled | StopReason::NotFinite
-            ) {
+            if has_ended {
                 break;
-            }
-            let factor = match stage.unfolding {
-                0.0 => settings.unfolding,
-                factor => 10.0 * factor,
-            };
-            if left.is_empty()
-                && round == settings.refinements
-                && settings.unfolding > 0.0
-                && factor <= 10.0 * settings.unfolding
-            {
-                map.apply(x.as_chunks().0, &mut fitted.points);
-                if fitted.scaled_jacobians().iter().any(|&jacobian| !(jacobian > 0.0)) {
-                    total += 1;
-                    left.push_back(Stage {
-                        unfolding: factor,
-                        ..stage
-                    });
-                }
             }
         }
         objective.value(&x);

@@ -87,7 +87,7 @@ pub static FIELDS: &[Field] = &[
         default: Default::Absent,
         doc: "Factor of a term on the corners of faces that are folded or nearly so, in stages of their own after the last: one \
               where faces are folded then, and another with ten times the factor where some still are. 0 for none. Preset \
-              best: 10, paper: 0.",
+              best: 10000, paper: 0.",
     },
     Field {
         name: "gradient",
@@ -324,7 +324,8 @@ const REGULARIZATION: [f64; 4] = [2e-2, 2e-3, 2e-3, 2e-4];
 /// The plain distance hardly folds; the stretched one slides vertices along the target to gain a little distance.
 const EVENNESS: [f64; 3] = [0.0, 0.0, 5e-3];
 
-const UNFOLDING: f64 = 10.0;
+/// Corners that span next to nothing weigh next to nothing by area squared, so that the factor has to be large.
+const UNFOLDING: f64 = 1e4;
 
 /// The settings that may have one entry a stage.
 const SCHEDULES: [&str; 4] = ["anisotropy", "regularization", "evenness", "change_tolerance"];

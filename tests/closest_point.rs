@@ -1,22 +1,14 @@
 //! Closest points agree with brute force on every processor, whatever the triangles; distances between surfaces with
 //! known values, to the bit with any number of threads.
 
+use crate::sample::{Noise, with_threads};
+use std::cell::Cell;
+use std::sync::LazyLock;
 use vargeo::geometry::closest_point::{ClosestPoint, Nearest, foot};
 use vargeo::linalg::processor::Processor;
 use vargeo::mesh::TriangleMesh;
 use vargeo::mesh::generate::shape::generate_shape;
-use vargeo::metric::distance::{Sampling, hausdorff, one_sided};
-
-/// Numbers in [-1, 1) from a linear congruential generator.
-fn numbers(seed: u64) -> impl FnMut() -> f64 {
-    let mut state = seed;
-    move || {
-        state = state
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        (state >> 11) as f64 / (1u64 << 52) as f64 - 1.0
-    }
-}
+use vargeo::metric::distance::{Hausdorff, Sampling, hausdorff, one_sided};
 
 /// What rounding of coordinates of size 1 to 100 may do to a squared distance.
 fn rounding(squared: f64) -> f64 {
@@ -64,12 +56,12 @@ fn searched(corners: [[f64; 3]; 3], point: [f64; 3]) -> f64 {
 
 /// Random triangles of very different sizes, needles, segments, points and copies among them.
 fn soup() -> TriangleMesh {
-    let mut next = numbers(7);
+    let mut noise = Noise(7);
     let mut mesh = TriangleMesh::default();
     for kind in 0..700 {
-        let size = 10f64.powf(2.0 * next() - 1.5);
-        let centre = [next(), next(), next()];
-        let mut corner = || -> [f64; 3] { std::array::from_fn(|axis| centre[axis] + size * next()) };
+        let size = 10f64.powf(2.0 * noise.number() - 1.5);
+        let centre = noise.point();
+        let mut corner = || -> [f64; 3] { std::array::from_fn(|axis| centre[axis] + size * noise.number()) };
         let [a, b, mut c] = [corner(), corner(), corner()];
         match kind % 10 {
             0 => c = b,
@@ -90,11 +82,11 @@ fn soup() -> TriangleMesh {
 #[test]
 fn nearest_triangle_as_by_brute_force() {
     let mesh = soup();
-    let mut next = numbers(11);
+    let mut noise = Noise(11);
     let points: Vec<[f64; 3]> = (0..300)
         .map(|index| {
             let reach = if index % 7 == 0 { 100.0 } else { 1.2 };
-            std::array::from_fn(|_| reach * next())
+            std::array::from_fn(|_| reach * noise.number())
         })
         .collect();
     let expected: Vec<f64> = points
@@ -140,9 +132,9 @@ fn nearest_triangle_as_by_brute_force() {
 #[test]
 fn foot_of_a_point_is_the_nearest_point_of_the_triangle() {
     let mesh = soup();
-    let mut next = numbers(5);
+    let mut noise = Noise(5);
     for &cell in mesh.cells.iter().step_by(3) {
-        let point: [f64; 3] = std::array::from_fn(|_| next());
+        let point: [f64; 3] = noise.point();
         let corners = mesh.corners(cell);
         let ours = squared(point, foot(corners, point));
         let searched = searched(corners, point);
@@ -191,17 +183,34 @@ fn distances_between_surfaces_with_known_values() {
         found.forward.mean
     );
 
-    // Concentric spheres: the distance is the same everywhere but for the facets.
-    let sphere = |radius: f64| {
-        let parameters = serde_json::json!({ "triangles": 3000, "a": radius, "b": radius, "c": radius });
-        generate_shape("ellipsoid", &parameters).unwrap()
-    };
-    let found = hausdorff(&sphere(1.0), &sphere(1.1), &never).unwrap();
+    // The distance is the same everywhere but for the facets.
+    let found = &CONCENTRIC.2;
     for distance in [&found.forward, &found.backward] {
         assert!((distance.mean - 0.1).abs() < 2e-3 && (distance.max - 0.1).abs() < 5e-3);
         assert!(distance.rms >= distance.mean && distance.rms <= distance.max);
     }
 }
+
+/// A measurement that is stopped when it asks for the `last` time, and how often it asked.
+fn stopped(first: &TriangleMesh, second: &TriangleMesh, last: u32) -> (Result<Hausdorff, String>, u32) {
+    let asked = Cell::new(0);
+    let outcome = hausdorff(first, second, &|| {
+        asked.set(asked.get() + 1);
+        asked.get() >= last
+    });
+    (outcome, asked.get())
+}
+
+/// Concentric spheres, as far from each other everywhere, so that no part of the search is cut short; their distances,
+/// and how often the measurement asked whether to stop.
+static CONCENTRIC: LazyLock<(TriangleMesh, TriangleMesh, Hausdorff, u32)> = LazyLock::new(|| {
+    let [first, second] = [1.0, 1.1].map(|radius| {
+        let parameters = serde_json::json!({ "triangles": 3000, "a": radius, "b": radius, "c": radius });
+        generate_shape("ellipsoid", &parameters).unwrap()
+    });
+    let (whole, questions) = stopped(&first, &second, u32::MAX);
+    (first, second, whole.unwrap(), questions)
+});
 
 /// For a measurement that is not to be stopped.
 fn never() -> bool {
@@ -210,22 +219,8 @@ fn never() -> bool {
 
 #[test]
 fn a_measurement_can_be_stopped_at_any_time() {
-    // Concentric spheres are as far from each other everywhere: no part of the search is cut short.
-    let sphere = |radius: f64| {
-        let parameters = serde_json::json!({ "triangles": 3000, "a": radius, "b": radius, "c": radius });
-        generate_shape("ellipsoid", &parameters).unwrap()
-    };
-    let (first, second) = (sphere(1.0), sphere(1.1));
-    let asked = std::cell::Cell::new(0);
-    let count = |last: u32| {
-        asked.set(0);
-        hausdorff(&first, &second, &|| {
-            asked.set(asked.get() + 1);
-            asked.get() >= last
-        })
-    };
-    let whole = count(u32::MAX).unwrap();
-    let questions = asked.get();
+    let (first, second, whole, questions) = &*CONCENTRIC;
+    let questions = *questions;
     // Sampling and searching, both ways, and again and again within.
     let work = whole.forward.samples + whole.backward.samples;
     assert!(
@@ -233,8 +228,9 @@ fn a_measurement_can_be_stopped_at_any_time() {
         "{questions} for {work} samples"
     );
     for last in 1..=questions {
-        assert!(count(last).is_err(), "asked {last} times");
-        assert_eq!(asked.get(), last, "goes on after it was told to stop");
+        let (outcome, asked) = stopped(first, second, last);
+        assert!(outcome.is_err(), "asked {last} times");
+        assert_eq!(asked, last, "goes on after it was told to stop");
     }
 }
 
@@ -278,10 +274,7 @@ fn same_bits_with_any_number_of_threads() {
         generate_shape("flower", &parameters).unwrap()
     };
     let (first, second) = (shape(0.01), shape(0.0));
-    let run = |threads: usize| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| hausdorff(&first, &second, &never).unwrap())
-    };
+    let run = |threads: usize| with_threads(threads, || hausdorff(&first, &second, &never).unwrap());
     let one = run(1);
     assert!(one.max() > 0.0);
     for threads in [2, 4] {

@@ -29,12 +29,17 @@ fn vargeo(folder: &Path, arguments: &[&str]) -> Command {
     command
 }
 
-/// Writes the experiment and gives a command to it; returns its exit code and what it said on each stream.
-fn experiment(folder: &Path, text: &str, arguments: &[&str]) -> (Option<i32>, String, String) {
-    std::fs::write(folder.join("small.toml"), text).unwrap();
+/// The exit code of a command and what it said on each stream.
+fn said(folder: &Path, arguments: &[&str]) -> (Option<i32>, String, String) {
     let Output { status, stdout, stderr } = vargeo(folder, arguments).output().unwrap();
     let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
     (status.code(), text(stdout), text(stderr))
+}
+
+/// Writes the experiment and gives a command to it.
+fn experiment(folder: &Path, text: &str, arguments: &[&str]) -> (Option<i32>, String, String) {
+    std::fs::write(folder.join("small.toml"), text).unwrap();
+    said(folder, arguments)
 }
 
 #[test]
@@ -66,11 +71,7 @@ fn a_folder_of_experiments_is_one_command() {
     std::fs::write(place("study/first.toml"), &one).unwrap();
     std::fs::write(place("study/more/second.toml"), &unmet).unwrap();
     std::fs::write(place("study/published.toml"), "[table]\nrows = []\n").unwrap();
-    let run = |arguments: &[&str]| {
-        let Output { status, stdout, stderr } = vargeo(folder.path(), arguments).output().unwrap();
-        let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
-        (status.code(), text(stdout), text(stderr))
-    };
+    let run = |arguments: &[&str]| said(folder.path(), arguments);
     let (code, output, errors) = run(&["check", "study", "--junit", "verdicts.xml"]);
     assert_eq!(code, Some(1), "{output}{errors}");
     assert!(errors.contains("first: 0 expectations met") && errors.contains("second: 0 expectations met, 1 failed"));
@@ -243,4 +244,51 @@ fn a_terminated_run_keeps_what_is_finished() {
         "{errors}"
     );
     assert_eq!(store.verify().unwrap().0, 1);
+}
+
+#[test]
+fn the_command_converts_shows_and_says_what_is_wrong() {
+    let folder = folder();
+    let run = |arguments: &[&str]| said(folder.path(), &[&["mesh"], arguments].concat());
+    // A reversed tetrahedron with a reference, and a section that is left out.
+    let text = "MeshVersionFormatted 2\nDimension 3\nVertices 4\n0 0 0 0\n1 0 0 0\n0 1.5 0 0\n0 0 1 0\nCorners 1\n1\nTetrahedra 1\n1 3 2 4 5\nEnd\n";
+    std::fs::write(folder.path().join("in.mesh"), text).expect("the folder takes files");
+
+    let (code, shown, errors) = run(&["in.mesh"]);
+    assert_eq!((code, errors.as_str()), (Some(0), ""), "{shown}");
+    for words in [
+        "MEDIT",
+        "1 tetrahedra",
+        "reference (1)",
+        "volume",
+        "0.25",
+        "genus 0, closed",
+        "repaired",
+        "Corners",
+    ] {
+        assert!(shown.contains(words), "{words} is not in\n{shown}");
+    }
+    let (code, shown, errors) = run(&["convert", "in.mesh", "out.vtu"]);
+    assert_eq!((code, shown.as_str()), (Some(0), ""), "{errors}");
+    assert!(errors.starts_with("notice: ") && errors.contains("Corners"), "{errors}");
+    let (code, shown, _) = run(&["out.vtu"]);
+    assert!(
+        code == Some(0) && shown.contains("VTU") && shown.contains("reference (1)"),
+        "{shown}"
+    );
+
+    for (arguments, words) in [
+        (&["convert", "in.mesh", "out.stl"][..], "STL cannot hold tetrahedra"),
+        (
+            &["convert", "in.mesh", "out.docx"][..],
+            "the extension tells no mesh format",
+        ),
+        (&["absent.mesh"][..], "cannot be read"),
+        (&[][..], "<FILE>"),
+    ] {
+        let (code, shown, errors) = run(arguments);
+        assert_eq!((code, shown.as_str()), (Some(3), ""), "{errors}");
+        assert!(errors.contains(words), "{errors}");
+    }
+    assert!(!folder.path().join("out.stl").exists());
 }

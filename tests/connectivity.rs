@@ -67,7 +67,7 @@ fn agrees_with_brute_force<const N: usize>(cells: &[[u32; N]], vertices: usize) 
 }
 
 /// A torus of `m` by `n` quadrangles, two triangles each.
-fn torus(m: u32, n: u32) -> Vec<[u32; 3]> {
+pub(crate) fn torus(m: u32, n: u32) -> Vec<[u32; 3]> {
     let at = |i: u32, j: u32| (i % m) * n + j % n;
     (0..m)
         .flat_map(|i| (0..n).map(move |j| (i, j)))

@@ -83,7 +83,7 @@ fn survive(name: &str, bytes: &[u8]) {
 
 #[test]
 fn every_truncation_of_every_specimen_is_survived() {
-    for (name, bytes) in super::formats::specimens() {
+    for (name, bytes) in crate::format_variants::specimens() {
         for length in 0..bytes.len() {
             survive(&name, &bytes[..length]);
         }
@@ -163,7 +163,7 @@ proptest! {
     #[test]
     fn any_damage_to_any_specimen_is_survived(damages in prop::collection::vec(damage(), 1..4)) {
         thread_local! {
-            static SPECIMENS: Vec<(String, Vec<u8>)> = super::formats::specimens();
+            static SPECIMENS: Vec<(String, Vec<u8>)> = crate::format_variants::specimens();
         }
         SPECIMENS.with(|specimens| {
             for (name, bytes) in specimens {

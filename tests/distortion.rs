@@ -1,20 +1,10 @@
 //! Distortion of maps whose singular values are known, under scaling, rotation and inversion.
 
 use vargeo::mesh::TetrahedralMesh;
+use vargeo::mesh::generate::lattice::kuhn;
 use vargeo::metric::distortion::{InvalidSource, distortion};
 use vargeo::metric::scaled_jacobian::ScaledJacobians;
 use vargeo::metric::{Metric, families};
-
-fn mesh() -> TetrahedralMesh {
-    let (points, cells) = super::sparse::grid(2);
-    let mut mesh = TetrahedralMesh { points, cells };
-    for index in 0..mesh.cells.len() {
-        if vargeo::mesh::determinant(mesh.corners(mesh.cells[index])) < 0.0 {
-            mesh.cells[index].swap(2, 3);
-        }
-    }
-    mesh
-}
 
 /// Rotated, stretched by the factors, rotated again.
 fn linear(mesh: &TetrahedralMesh, factors: [f64; 3]) -> Vec<[f64; 3]> {
@@ -33,7 +23,7 @@ fn close(a: f64, b: f64) {
 
 #[test]
 fn of_linear_maps() {
-    let mesh = mesh();
+    let mesh = kuhn(2);
     let image = linear(&mesh, [3.0, 1.5, 0.5]);
     let measured = distortion(&mesh, &image, 2.25).unwrap();
     close(measured.d_aa, 6.0 + 1.0 / 6.0);
@@ -59,7 +49,7 @@ fn of_linear_maps() {
 
 #[test]
 fn averages_weigh_by_source_volume() {
-    let mut mesh = mesh();
+    let mut mesh = kuhn(2);
     // The middle vertex moves in the source: volumes differ, the identity does not.
     let image = mesh.points.clone();
     mesh.points[13] = [0.6, 0.4, 0.55];
@@ -80,7 +70,7 @@ fn averages_weigh_by_source_volume() {
 
 #[test]
 fn inverted_and_flat_tetrahedra() {
-    let mesh = mesh();
+    let mesh = kuhn(2);
     let mirrored = distortion(&mesh, &linear(&mesh, [2.0, 1.0, -1.0]), 2.0).unwrap();
     assert_eq!((mirrored.inverted, mirrored.degenerate), (mesh.cells.len(), 0));
     close(mirrored.d_aa, 2.5);

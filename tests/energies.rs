@@ -29,10 +29,10 @@ fn all() -> Vec<&'static dyn Energy> {
 }
 
 /// Numbers that look random (Steele et al. 2014, splitmix), uniform in [-1, 1].
-pub struct Random(pub u64);
+pub(crate) struct Random(pub u64);
 
 impl Random {
-    pub fn number(&mut self) -> f64 {
+    pub(crate) fn number(&mut self) -> f64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;
         z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -40,11 +40,11 @@ impl Random {
         ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
     }
 
-    pub fn matrix(&mut self) -> Matrix3<f64> {
+    pub(crate) fn matrix(&mut self) -> Matrix3<f64> {
         Matrix3::from_fn(|_, _| self.number())
     }
 
-    pub fn rotation(&mut self) -> Matrix3<f64> {
+    pub(crate) fn rotation(&mut self) -> Matrix3<f64> {
         let axis = Vector3::from_fn(|_, _| self.number());
         Rotation3::new(axis.normalize() * 3.0 * self.number()).into_inner()
     }

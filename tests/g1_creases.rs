@@ -1,40 +1,18 @@
 //! Surfaces with creases: the cut, the curves along them, patches on both sides.
 
+use crate::sample::{self, file, generated, model};
 use serde_json::{Value, json};
 use vargeo::linalg::vector3::{cross, dot};
 use vargeo::mesh::crease::{by_angle, by_label, by_list, cut};
 use vargeo::mesh::generate::surface::generate_surface;
 use vargeo::mesh::quadrilateral::Connectivity;
 use vargeo::method::g1_surface::G1Surface;
-use vargeo::method::model::{LoadedModel, Part};
-use vargeo::method::{Failure, Inputs, Method, Outcome};
+use vargeo::method::model::Part;
+use vargeo::method::{Failure, Outcome};
 use vargeo::optimize::Silent;
 
 fn run(parts: &[(&str, Part)], settings: Value) -> Result<Outcome, Failure> {
-    let mut model = LoadedModel::default();
-    for (name, part) in parts {
-        model.parts.insert(name.to_string(), part.clone());
-    }
-    let inputs = Inputs {
-        settings: &settings,
-        model,
-    };
-    G1Surface.run(inputs, &mut Silent)
-}
-
-fn generated(name: &str, parameters: Value) -> Part {
-    Part::Generated {
-        generator: name.to_string(),
-        parameters,
-    }
-}
-
-fn file(name: &str, text: &str) -> Part {
-    Part::File {
-        name: name.to_string(),
-        bytes: text.as_bytes().to_vec(),
-        parameters: json!({}),
-    }
+    sample::run(&G1Surface, model(parts.iter().cloned()), settings)
 }
 
 #[test]
@@ -179,7 +157,7 @@ fn creases_come_from_angles_lists_and_labels() {
         corners.push_str(&format!("f {}\n", words.join(" ")));
     }
     let settings = json!({ "crease_normals": true, "tessellation": 1 });
-    let named = run(&[("mesh", file("box.obj", &corners))], settings.clone()).expect("a box");
+    let named = run(&[("mesh", file("box.obj", corners.as_str()))], settings.clone()).expect("a box");
     assert_eq!(metric(&named, "crease_edges"), 12.0);
     assert!((metric(&named, "area") - 22.0).abs() < 1e-12 && metric(&named, "angle_max") == 0.0);
     let without = run(&[("mesh", file("box.obj", BOX))], settings)
@@ -188,7 +166,7 @@ fn creases_come_from_angles_lists_and_labels() {
     assert!(without.contains("crease_normals needs"), "{without}");
     // Corner normals that are summed, and given normals that creases replace, are told.
     let told = |settings: Value, word: &str| {
-        let outcome = run(&[("mesh", file("box.obj", &corners))], settings).expect("a box");
+        let outcome = run(&[("mesh", file("box.obj", corners.as_str()))], settings).expect("a box");
         assert!(
             outcome.notices.iter().any(|notice| notice.contains(word)),
             "{word}: {:?}",
@@ -219,10 +197,7 @@ fn creases_come_from_angles_lists_and_labels() {
 fn a_crease_is_perpendicular_to_the_normals_of_both_sides() {
     use vargeo::method::g1_surface::problem::Problem;
     use vargeo::method::g1_surface::settings::Settings;
-    let mut model = LoadedModel::default();
-    model
-        .parts
-        .insert("mesh".to_string(), generated("cube", json!({ "cells": 2 })));
+    let model = model([("mesh", generated("cube", json!({ "cells": 2 })))]);
     let settings = Settings::resolve(&json!({})).expect("defaults");
     let problem = Problem::new(&model, &settings, &Silent).expect("a cube");
     let creases = problem.creases.as_ref().expect("creases");

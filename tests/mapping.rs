@@ -1,6 +1,7 @@
 //! The energy of a map over a mesh: derivatives, affine maps, determinism, the largest valid step, bad input.
 
 use crate::energies::Random;
+use crate::sample::with_threads;
 use nalgebra::{Matrix3, SMatrix, SymmetricEigen, Vector3};
 use vargeo::energy::lim_barrier::LimBarrier;
 use vargeo::energy::mapping::{BLOCK_NUMBERS, BLOCK_PAIRS, Density, InvalidRest, MappingEnergy};
@@ -9,49 +10,16 @@ use vargeo::energy::untangling::Untangling;
 use vargeo::energy::{energies, find};
 use vargeo::linalg::processor::Processor;
 use vargeo::mesh::TetrahedralMesh;
+use vargeo::mesh::generate::lattice::kuhn;
 
 /// A cube of n^3 cells, six tetrahedra each, with its inner vertices moved a little.
 fn grid(n: usize) -> TetrahedralMesh {
-    let index = |i: usize, j: usize, k: usize| (i + (n + 1) * (j + (n + 1) * k)) as u32;
     let mut random = Random(20);
-    let mut mesh = TetrahedralMesh::default();
-    for k in 0..=n {
-        for j in 0..=n {
-            for i in 0..=n {
-                let inner = [i, j, k].iter().all(|&c| c > 0 && c < n);
-                let shift = if inner { 0.1 } else { 0.0 };
-                mesh.points
-                    .push([i, j, k].map(|c| (c as f64 + shift * random.number()) / n as f64));
-            }
-        }
-    }
-    for k in 0..n {
-        for j in 0..n {
-            for i in 0..n {
-                // Paths from corner 0 to corner 7 along the axes.
-                for (axes, even) in [
-                    ([0, 1, 2], true),
-                    ([1, 2, 0], true),
-                    ([2, 0, 1], true),
-                    ([0, 2, 1], false),
-                    ([2, 1, 0], false),
-                    ([1, 0, 2], false),
-                ] {
-                    let mut corner = [i, j, k];
-                    let mut cell = [0; 4];
-                    for (step, place) in cell.iter_mut().enumerate() {
-                        *place = index(corner[0], corner[1], corner[2]);
-                        if step < 3 {
-                            corner[axes[step]] += 1;
-                        }
-                    }
-                    if !even {
-                        cell.swap(1, 2);
-                    }
-                    mesh.cells.push(cell);
-                }
-            }
-        }
+    let mut mesh = kuhn(n);
+    for point in &mut mesh.points {
+        let inner = point.iter().all(|&c| c > 0.0 && c < 1.0);
+        let shift = if inner { 0.1 / n as f64 } else { 0.0 };
+        *point = point.map(|c| c + shift * random.number());
     }
     mesh
 }
@@ -335,11 +303,7 @@ fn same_bits_with_any_number_of_threads_and_in_every_instruction_set() {
         for processor in Processor::available() {
             energy.set_processor(processor);
             for threads in [1, 2, 4] {
-                let pool = rayon::ThreadPoolBuilder::new()
-                    .num_threads(threads)
-                    .build()
-                    .expect("threads");
-                let numbers = pool.install(|| {
+                let numbers = with_threads(threads, || {
                     let (value, mut gradient, mut blocks) = evaluate(&energy, &positions);
                     assert!(value.is_finite());
                     gradient.append(&mut blocks);

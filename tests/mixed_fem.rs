@@ -1,50 +1,31 @@
 //! Mixed finite elements against stored solutions of an independent program, and the promises of the method.
 
+use crate::sample::{self, metric_bits, model, with_threads};
 use serde_json::{Value, json};
 use vargeo::fem::surface::{SurfaceOperators, mean_edge_length};
 use vargeo::mesh::TriangleMesh;
 use vargeo::mesh::format;
 use vargeo::mesh::planar::{self, Domain, FAMILIES, Family};
 use vargeo::method::mixed_fem::MixedFem;
-use vargeo::method::model::{LoadedModel, Part};
-use vargeo::method::{Failure, Inputs, Method, Outcome};
-use vargeo::optimize::Silent;
+use vargeo::method::model::LoadedModel;
+use vargeo::method::{Failure, Method, Outcome};
 
 /// A generated model.
-fn generated(generator: &str, parameters: Value) -> LoadedModel {
-    let part = Part::Generated {
-        generator: generator.to_string(),
-        parameters,
-    };
-    LoadedModel {
-        parts: [("mesh".to_string(), part)].into(),
-    }
+pub(crate) fn generated(generator: &str, parameters: Value) -> LoadedModel {
+    model([("mesh", sample::generated(generator, parameters))])
 }
 
 /// A model from the text of an OBJ file.
-fn file(text: &str) -> LoadedModel {
-    let part = Part::File {
-        name: "test.obj".to_string(),
-        bytes: text.as_bytes().to_vec(),
-        parameters: Value::Null,
-    };
-    LoadedModel {
-        parts: [("mesh".to_string(), part)].into(),
-    }
+pub(crate) fn file(text: &str) -> LoadedModel {
+    model([("mesh", sample::file("test.obj", text))])
 }
 
-fn run(model: LoadedModel, settings: Value) -> Result<Outcome, Failure> {
+pub(crate) fn run(model: LoadedModel, settings: Value) -> Result<Outcome, Failure> {
     assert_eq!(MixedFem.check(&settings), Vec::new(), "valid settings");
-    MixedFem.run(
-        Inputs {
-            settings: &settings,
-            model,
-        },
-        &mut Silent,
-    )
+    sample::run(&MixedFem, model, settings)
 }
 
-fn field(outcome: &Outcome, name: &str) -> Vec<f64> {
+pub(crate) fn field(outcome: &Outcome, name: &str) -> Vec<f64> {
     let content = format::read("result.vtu", outcome.mesh.as_ref().expect("a mesh")).expect("a VTU file");
     let field = content.point_data.into_iter().find(|field| field.name == name);
     field.expect("the field").values
@@ -216,117 +197,6 @@ fn the_stabilised_system_converges_where_others_do_not() {
 }
 
 #[test]
-fn symmetric_factorizations_hold_for_the_mixed_systems_of_larger_meshes() {
-    for (family, condition) in [
-        ("regular", "region"),
-        ("regular", "curve"),
-        ("minimum-angle-30", "curve"),
-        ("minimum-angle-1", "region"),
-    ] {
-        for equation in ["biharmonic", "triharmonic"] {
-            for solver in ["ldlt", "lblt"] {
-                let settings = json!({
-                    "equation": equation, "condition": condition, "system": "mixed", "solver": solver, "compare": true,
-                    "relaxation": "linear",
-                });
-                let outcome = run(generated("square", json!({ "family": family, "cells": 32 })), settings)
-                    .unwrap_or_else(|failure| panic!("{family}, {condition}, {equation}: {}", failure.reason));
-                let difference = outcome.metrics["difference"];
-                assert!(
-                    difference < 1e-9,
-                    "{family}, {condition}, {equation}, {solver}: {difference:e}"
-                );
-            }
-        }
-    }
-}
-
-#[test]
-fn what_has_no_second_system_has_the_same_solution_by_other_pivots() {
-    for family in ["criss-cross", "minimum-angle-1"] {
-        let solution = |solver: &str| {
-            let settings = json!({
-                "equation": "triharmonic", "condition": "curve", "solver": solver, "compare": true,
-            });
-            let outcome =
-                run(generated("square", json!({ "family": family, "cells": 24 })), settings).expect("a solution");
-            assert!(outcome.metrics["difference"].is_nan());
-            let told = |notice: &String| notice.contains("no comparison") && notice.contains("tangential");
-            assert!(outcome.notices.iter().any(told), "{:?}", outcome.notices);
-            field(&outcome, "solution")
-        };
-        let first = solution("ldlt");
-        for other in ["lblt", "lu"] {
-            for (first, other) in first.iter().zip(solution(other)) {
-                assert!((first - other).abs() < 1e-9, "{family}: {first} and {other}");
-            }
-        }
-    }
-}
-
-#[test]
-fn known_signs_are_the_default_and_pivoting_answers_where_they_fail() {
-    let solve = |settings: Value| {
-        run(
-            generated("square", json!({ "family": "regular", "cells": 8 })),
-            settings,
-        )
-    };
-    for curve in ["stabilised", "first-order-ring", "second-order-ring"] {
-        let settings = json!({ "equation": "triharmonic", "condition": "curve", "curve": curve });
-        let outcome = solve(settings).expect("a solution");
-        assert!(outcome.reason.contains("ldlt"), "{curve}: {}", outcome.reason);
-        assert_eq!(outcome.counters["fallbacks"], 0);
-    }
-    // No diagonal for w on the boundary: without pivots there is no factorization.
-    let settings = json!({
-        "equation": "triharmonic", "condition": "curve", "curve": "unstabilised", "system": "mixed",
-        "on_singular": "continue", "solver": "ldlt",
-    });
-    let outcome = solve(settings).expect("an outcome");
-    assert!(
-        outcome.stop == "singular" && outcome.reason.contains("sign"),
-        "{}",
-        outcome.reason
-    );
-}
-
-/// A sphere of eight triangles or its refinements, closed, as OBJ text.
-fn octahedron() -> String {
-    let points = ["1 0 0", "-1 0 0", "0 1 0", "0 -1 0", "0 0 1", "0 0 -1"];
-    let faces = ["1 3 5", "3 2 5", "2 4 5", "4 1 5", "3 1 6", "2 3 6", "4 2 6", "1 4 6"];
-    let mut text: String = points.iter().map(|point| format!("v {point}\n")).collect();
-    text.extend(faces.iter().map(|face| format!("f {face}\n")));
-    text
-}
-
-#[test]
-fn pivoting_takes_over_where_signs_fail_and_names_the_place() {
-    // A closed surface with one fixed point, the last to be eliminated: its v meets a zero pivot.
-    let mut fallbacks = 0;
-    for pole in [[0, 0, 1], [0, 0, -1], [1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]] {
-        let settings = json!({
-            "equation": "triharmonic", "condition": "region", "data": "displacement", "system": "mixed",
-            "handles": [{ "select": "nearest", "center": pole, "role": "moved", "translate": [0.5, 0.0, 0.0] }],
-        });
-        let outcome = run(file(&octahedron()), settings.clone()).expect("a solution");
-        // One point moved and nothing else fixed: everything follows it.
-        assert!((outcome.metrics["displacement_max"] - 0.5).abs() < 1e-9);
-        if outcome.counters["fallbacks"] > 0 {
-            fallbacks += 1;
-            assert_eq!(outcome.counters["factorizations"], 2);
-            assert!(outcome.reason.contains("lblt"), "{}", outcome.reason);
-            assert!(outcome.notices.iter().any(|notice| notice.contains("ldlt at vertex")));
-            let mut settings = settings;
-            settings["solver"] = json!("ldlt");
-            let failure = run(file(&octahedron()), settings).expect_err("a zero pivot");
-            assert!(failure.reason.contains("at vertex"), "{}", failure.reason);
-        }
-    }
-    assert!(fallbacks > 0, "one of the poles is eliminated last");
-}
-
-#[test]
 fn separate_parts_do_not_influence_each_other() {
     // Two squares of different size and resolution; the first alone, and beside the second.
     let square = |cells: usize, size: f64, shift: f64, first: usize| {
@@ -364,80 +234,8 @@ fn separate_parts_do_not_influence_each_other() {
     }
 }
 
-#[test]
-fn estimated_rounding_bounds_the_difference_of_two_systems() {
-    // Both systems have the same exact solution, whatever the triangles. A vertex ever nearer to its neighbour makes
-    // needles.
-    let mut worst = 0.0f64;
-    for distance in [1.0, 1e-2, 1e-4] {
-        let mesh = grid(12, |lines| {
-            let inner = lines
-                .iter()
-                .position(|line| line == "v 6 6 0")
-                .expect("an inner vertex");
-            lines[inner] = format!("v 6 {} 0", 5.0 + distance);
-        });
-        let mut difference = 0.0;
-        let mut rounding = 0.0;
-        for system in ["mixed", "one-field"] {
-            let settings = json!({
-                "equation": "triharmonic", "condition": "curve", "data": "position", "compare": true, "system": system,
-                "relaxation": "linear",
-                "handles": [{ "select": "boundary" }],
-            });
-            let outcome = run(file(&mesh), settings).expect("a solution");
-            let own = outcome.metrics["rounding"];
-            let told = outcome.notices.iter().any(|notice| notice.contains("rounding alone"));
-            assert!(
-                own < 1e-6 || told,
-                "{distance:e} {system}: {own:e} {:?}",
-                outcome.notices
-            );
-            difference = outcome.metrics["difference"];
-            rounding += own;
-        }
-        assert!(
-            difference < 30.0 * rounding,
-            "{distance:e}: {difference:e}, {rounding:e}"
-        );
-        assert!(
-            rounding < 1e3 * difference,
-            "{distance:e}: {difference:e}, {rounding:e}"
-        );
-        worst = worst.max(difference);
-    }
-    assert!(worst > 1e-4, "{worst:e}");
-}
-
-#[test]
-fn singular_configurations_are_found_and_named() {
-    // Nullities that the independent program measured.
-    // Neighbourhoods alone do not show that of the criss-cross mesh.
-    for (family, nullity, bound) in [
-        ("regular", 8.0, 8.0),
-        ("union-jack", 8.0, 8.0),
-        ("criss-cross", 4.0, 0.0),
-    ] {
-        let settings = json!({ "equation": "triharmonic", "condition": "curve", "curve": "unstabilised" });
-        let failure = run(
-            generated("square", json!({ "family": family, "cells": 4 })),
-            settings.clone(),
-        )
-        .expect_err("a singular system");
-        assert_eq!(failure.kind, "singular");
-        let named = failure.reason.contains("Proposition 2") && failure.reason.contains("meet no free vertex but");
-        assert!(named || bound == 0.0, "{}", failure.reason);
-        let mut settings = settings;
-        settings["on_singular"] = json!("continue");
-        settings["system"] = json!("mixed");
-        let outcome = run(generated("square", json!({ "family": family, "cells": 4 })), settings).expect("an outcome");
-        assert_eq!(outcome.metrics["nullity_bound"], bound, "{family}");
-        assert_eq!(outcome.metrics["nullity"], nullity, "{family}");
-    }
-}
-
 /// A flat grid of triangles as OBJ text, with a change to its lines.
-fn grid(cells: usize, change: impl Fn(&mut Vec<String>)) -> String {
+pub(crate) fn grid(cells: usize, change: impl Fn(&mut Vec<String>)) -> String {
     let mut lines = Vec::new();
     for i in 0..=cells {
         for j in 0..=cells {
@@ -623,15 +421,10 @@ fn a_filled_hole_joins_smoothly_and_frames_share_a_factorization() {
 #[test]
 fn results_have_the_same_bits_with_any_number_of_threads() {
     let result = |threads: usize| {
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build()
-            .expect("a pool");
-        pool.install(|| {
+        with_threads(threads, || {
             let model = generated("square", json!({ "family": "minimum-angle-30", "cells": 24 }));
             let outcome = run(model, json!({ "equation": "triharmonic", "compare": true })).expect("a solution");
-            let bits: Vec<u64> = outcome.metrics.values().map(|value| value.to_bits()).collect();
-            (bits, outcome.mesh)
+            (metric_bits(&outcome), outcome.mesh)
         })
     };
     let one = result(1);

@@ -1,16 +1,116 @@
 //! The page holds everything, loads nothing, lets nothing through as markup, and is the same for the same records.
 
-use crate::sample;
+use crate::sample::{self, Noise};
 use serde_json::json;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use vargeo::experiment::file::Experiment;
 use vargeo::experiment::record::Status;
+use vargeo::mesh::TetrahedralMesh;
+use vargeo::mesh::format::{Cells, vtu};
+use vargeo::mesh::generate::lattice::kuhn;
 use vargeo::report::{self, Row};
 
 fn written(experiment: &Experiment, rows: &[Row]) -> String {
     let folder = tempfile::tempdir().unwrap();
     let written = report::write(experiment, rows, rows.len(), folder.path()).unwrap();
     std::fs::read_to_string(written.page).unwrap()
+}
+
+/// Bytes in a file of their own, as a store holds them.
+fn stored(bytes: &[u8]) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("stored");
+    std::fs::create_dir_all(&folder).expect("a folder");
+    let path = folder.join(vargeo::experiment::job::sha256(bytes));
+    let mut file = tempfile::NamedTempFile::new_in(&folder).expect("a file");
+    std::io::Write::write_all(&mut file, bytes).expect("room for it");
+    file.persist(&path).expect("a file");
+    path
+}
+
+/// A grid of six tetrahedra a cell mapped onto a bulging, twisted one, as a VTU file with the fields of a map.
+fn mesh(size: usize, twist: f64) -> Vec<u8> {
+    let mut noise = Noise(12_345);
+    let TetrahedralMesh {
+        points: mut source,
+        cells,
+    } = kuhn(size);
+    let mut image = Vec::new();
+    for point in &mut source {
+        let place = point.map(|part| 2.0 * part - 1.0);
+        let inner = place.iter().all(|part| part.abs() < 1.0);
+        let shake = if inner { 0.25 / size as f64 } else { 0.0 };
+        *point = place.map(|part| part + shake * noise.number());
+        let [x, y, z] = *point;
+        // The cube onto the ball, then twisted about the third axis.
+        let ball = [
+            x * (1.0 - y * y / 2.0 - z * z / 2.0 + y * y * z * z / 3.0).sqrt(),
+            y * (1.0 - z * z / 2.0 - x * x / 2.0 + z * z * x * x / 3.0).sqrt(),
+            z * (1.0 - x * x / 2.0 - y * y / 2.0 + x * x * y * y / 3.0).sqrt(),
+        ];
+        let (sine, cosine) = (twist * ball[2]).sin_cos();
+        image.push([
+            cosine * ball[0] - sine * ball[1],
+            sine * ball[0] + cosine * ball[1],
+            ball[2],
+        ]);
+    }
+    let determinant =
+        |points: &[[f64; 3]], cell: &[u32; 4]| vargeo::mesh::determinant(cell.map(|corner| points[corner as usize]));
+    let determinants: Vec<f64> = cells
+        .iter()
+        .map(|cell| determinant(&image, cell) / determinant(&source, cell))
+        .collect();
+    let edges = |points: &[[f64; 3]], cell: &[u32; 4]| {
+        let mut sum = 0.0;
+        for i in 0..4 {
+            for j in 0..i {
+                sum += (0..3)
+                    .map(|axis| (points[cell[i] as usize][axis] - points[cell[j] as usize][axis]).powi(2))
+                    .sum::<f64>();
+            }
+        }
+        sum
+    };
+    let angle: Vec<f64> = cells
+        .iter()
+        .zip(&determinants)
+        .map(|(cell, det)| edges(&image, cell) / edges(&source, cell) / det.abs().max(1e-9).powf(2.0 / 3.0))
+        .collect();
+    let volume: Vec<f64> = determinants
+        .iter()
+        .map(|det| det.abs().max(1e-12).max(1.0 / det.abs().max(1e-12)))
+        .collect();
+    let density: Vec<f64> = angle
+        .iter()
+        .zip(&volume)
+        .map(|(angle, volume)| angle * angle + volume)
+        .collect();
+    let jacobian: Vec<f64> = determinants
+        .iter()
+        .zip(&angle)
+        .map(|(det, angle)| det.signum() / angle)
+        .collect();
+    let inverted: Vec<f64> = determinants
+        .iter()
+        .enumerate()
+        .map(|(index, det)| f64::from(u8::from(*det <= 0.0 || index % 977 == 5)))
+        .collect();
+    vtu::write(
+        &image,
+        Cells {
+            tetrahedra: &cells,
+            ..Cells::default()
+        },
+        &[("source", 3, source.as_flattened())],
+        &[
+            ("angle_distortion", 1, &angle),
+            ("volume_distortion", 1, &volume),
+            ("determinant", 1, &determinants),
+            ("energy_density", 1, &density),
+            ("scaled_jacobian", 1, &jacobian),
+            ("inverted", 1, &inverted),
+        ],
+    )
 }
 
 /// Ten results of one mesh of 13,182 tetrahedra.
@@ -23,7 +123,7 @@ fn ten() -> Vec<Row> {
                 ("model".into(), json!("ball")),
                 ("energy".into(), json!(format!("energy {index}"))),
             ];
-            row.mesh = Some(sample::stored(&sample::mesh(13, 0.15 * index as f64)));
+            row.mesh = Some(stored(&mesh(13, 0.15 * index as f64)));
             row
         })
         .collect()
@@ -109,8 +209,8 @@ fn text_cannot_become_markup() {
         row.record.measurement.host = evil.into();
         row.axes[0].1 = json!(evil);
     }
-    rows[0].mesh = Some(sample::stored(&sample::mesh(2, 0.1)));
-    rows[1].mesh = Some(sample::stored(format!("no mesh {evil}").as_bytes()));
+    rows[0].mesh = Some(stored(&mesh(2, 0.1)));
+    rows[1].mesh = Some(stored(format!("no mesh {evil}").as_bytes()));
     let page = written(&experiment, &rows);
     assert_well_formed(&page);
     assert!(!page.contains("alert(1)</script>"));
@@ -131,7 +231,7 @@ fn the_same_records_give_the_same_bytes() {
             .collect::<Vec<_>>()
     };
     let mut rows = sample::rows();
-    rows[1].mesh = Some(sample::stored(&sample::mesh(4, 0.4)));
+    rows[1].mesh = Some(stored(&mesh(4, 0.4)));
     let (first, second) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
     let stored = tempfile::NamedTempFile::new().unwrap();
     rows[1].files = vec![("notes.txt".into(), stored.path().into())];
@@ -162,7 +262,7 @@ fn to_look_at() {
     let mut rows = sample::rows();
     for (index, row) in rows.iter_mut().enumerate() {
         if row.record.result.status == Status::Done {
-            row.mesh = Some(sample::stored(&sample::mesh(13, 0.5 * index as f64)));
+            row.mesh = Some(stored(&mesh(13, 0.5 * index as f64)));
         }
     }
     let (mut study, rate) = sample::study();

@@ -8,7 +8,7 @@ use vargeo::mesh::format;
 use vargeo::mesh::generate::surface::{generate_surface, surfaces};
 use vargeo::mesh::quadrilateral::{Connectivity, QuadrilateralMesh, Triangles, check, orient, quad_and_corner};
 
-fn length(vector: [f64; 3]) -> f64 {
+pub(crate) fn length(vector: [f64; 3]) -> f64 {
     dot(vector, vector).sqrt()
 }
 

@@ -1,20 +1,14 @@
 //! The restricted Voronoi diagram against brute force, on random and on adversarial inputs.
 
+use crate::sample::Noise;
 use vargeo::geometry::point_tree::PointTree;
 use vargeo::geometry::restricted_voronoi::{Compatibility, Error, Label, RestrictedVoronoi, Way};
+use vargeo::linalg::vector3::{cross, subtract};
 
 type Point = [f64; 3];
 
-fn subtract(a: Point, b: Point) -> Point {
-    std::array::from_fn(|k| a[k] - b[k])
-}
-
 fn square(a: Point) -> f64 {
     a.iter().map(|x| x * x).sum()
-}
-
-fn cross(a: Point, b: Point) -> Point {
-    std::array::from_fn(|k| a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3])
 }
 
 fn area(polygon: &[Point]) -> f64 {
@@ -24,22 +18,6 @@ fn area(polygon: &[Point]) -> f64 {
         sum = std::array::from_fn(|axis| sum[axis] + part[axis]);
     }
     0.5 * square(sum).sqrt()
-}
-
-/// Deterministic numbers in (-1, 1).
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> f64 {
-        self.0 = self
-            .0
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 11) as f64 / (1u64 << 52) as f64 - 1.0
-    }
-    fn points(&mut self, count: usize) -> Vec<Point> {
-        (0..count).map(|_| [self.next(), self.next(), self.next()]).collect()
-    }
 }
 
 /// Triangles that share no vertex.
@@ -149,7 +127,7 @@ fn check(name: &str, points: &[Point], cells: &[[u32; 3]], sites: &[Point]) -> u
 
 #[test]
 fn brute_force_on_random_soups() {
-    let mut random = Random(1);
+    let mut random = Noise(1);
     for (triangles, sites, size) in [
         (40, 1, 1.0),
         (30, 12, 1.0),
@@ -159,7 +137,7 @@ fn brute_force_on_random_soups() {
     ] {
         let mut corners = Vec::new();
         for _ in 0..triangles {
-            let centre = random.points(1)[0];
+            let centre = random.point();
             for corner in random.points(3) {
                 corners.push(std::array::from_fn(|k| centre[k] + size * corner[k]));
             }
@@ -254,7 +232,7 @@ fn adversarial_inputs() {
     let column: Vec<Point> = (0..30).map(|k| [1.0, 1.0, k as f64 * 0.1]).collect();
     check("above each other", &points, &cells, &column);
     // Many sites in one triangle, in a grid in its plane and at random, and far from it.
-    let mut random = Random(3);
+    let mut random = Noise(3);
     let plane: Vec<Point> = (0..1600)
         .map(|k| [(k % 40) as f64 * 0.07, (k / 40) as f64 * 0.07, 0.3])
         .collect();
@@ -267,7 +245,7 @@ fn adversarial_inputs() {
     check("cloud in the plane", &points, &cells, &cloud);
     // Functions that come close to being lowest but are not.
     for seed in 0..6 {
-        let mut random = Random(100 + seed);
+        let mut random = Noise(100 + seed);
         let points = random.points(6);
         let near: Vec<Point> = random
             .points(400)
@@ -364,7 +342,7 @@ fn normal_compatibility() {
 /// Power diagrams against brute force: every triangle has offsets of its own.
 #[test]
 fn normal_compatibility_on_random_soups() {
-    let mut random = Random(5);
+    let mut random = Noise(5);
     let (points, cells) = soup(random.points(90));
     let sites = random.points(70);
     let normals: Vec<Point> = random
@@ -402,7 +380,7 @@ fn normal_compatibility_on_random_soups() {
 /// The slower ways, when forced, give the same pieces as the quick one.
 #[test]
 fn every_way_of_cutting() {
-    let mut random = Random(8);
+    let mut random = Noise(8);
     let (points, cells) = soup(random.points(60));
     for count in [5, 30, 400] {
         let tree = PointTree::new(&random.points(count));
@@ -458,7 +436,7 @@ fn many_sites_as_near() {
     ]);
     check("about a line", &points, &cells, &circle);
     // In one place but for rounding.
-    let mut random = Random(11);
+    let mut random = Noise(11);
     let mut sites: Vec<Point> = random.points(120).iter().map(|x| x.map(|x| 2e-16 * x + 0.3)).collect();
     sites.extend(random.points(20));
     check("in a crowd", &points, &cells, &sites);

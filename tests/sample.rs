@@ -1,22 +1,84 @@
-//! A constructed experiment with records of every kind of end, for the tests of the report.
+//! Samples for tests of many properties: models and runs of methods, numbers, an experiment with every end of a job.
 
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
 use vargeo::experiment::file::{
     Axis, Bound, Comparison, Condition, Expectation, Experiment, Limits, Origin, Plot, Published, Rate, Table, Timing,
 };
 use vargeo::experiment::job::{Job, JobPart, Key};
 use vargeo::experiment::record::{JobResult, Measurement, Phase, Record, Status};
-use vargeo::mesh::format::{Cells, vtu};
-use vargeo::method::model::ModelKind;
+use vargeo::method::model::{LoadedModel, ModelKind, Part};
 use vargeo::method::setting::Field;
 use vargeo::method::{Failure, Inputs, Method, Outcome};
 use vargeo::metric::{Better, Metric};
-use vargeo::optimize::Observer;
+use vargeo::optimize::{Observer, Silent};
 use vargeo::report::Row;
 
-pub struct Sample;
+/// A part of a model from a generator.
+pub(crate) fn generated(generator: &str, parameters: Value) -> Part {
+    Part::Generated {
+        generator: generator.to_string(),
+        parameters,
+    }
+}
+
+/// A part of a model from a file that holds these bytes.
+pub(crate) fn file(name: &str, bytes: impl Into<Vec<u8>>) -> Part {
+    Part::File {
+        name: name.to_string(),
+        bytes: bytes.into(),
+        parameters: json!({}),
+    }
+}
+
+/// A model of parts by role.
+pub(crate) fn model<'a>(parts: impl IntoIterator<Item = (&'a str, Part)>) -> LoadedModel {
+    let parts = parts.into_iter().map(|(role, part)| (role.to_string(), part));
+    LoadedModel { parts: parts.collect() }
+}
+
+/// What a method makes of a model.
+pub(crate) fn run(method: &dyn Method, model: LoadedModel, settings: Value) -> Result<Outcome, Failure> {
+    let inputs = Inputs {
+        settings: &settings,
+        model,
+    };
+    method.run(inputs, &mut Silent)
+}
+
+/// All figures of an outcome, to the bit.
+pub(crate) fn metric_bits(outcome: &Outcome) -> Vec<u64> {
+    outcome.metrics.values().map(|value| value.to_bits()).collect()
+}
+
+/// What comes out with so many threads.
+pub(crate) fn with_threads<R: Send>(threads: usize, run: impl FnOnce() -> R + Send) -> R {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+    pool.expect("threads").install(run)
+}
+
+/// Numbers in [-1, 1) from a linear congruential generator, the same on every run.
+pub(crate) struct Noise(pub u64);
+
+impl Noise {
+    pub(crate) fn number(&mut self) -> f64 {
+        self.0 = self
+            .0
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+    }
+
+    pub(crate) fn point(&mut self) -> [f64; 3] {
+        std::array::from_fn(|_| self.number())
+    }
+
+    pub(crate) fn points(&mut self, count: usize) -> Vec<[f64; 3]> {
+        (0..count).map(|_| self.point()).collect()
+    }
+}
+
+pub(crate) struct Sample;
 
 impl Method for Sample {
     fn name(&self) -> &'static str {
@@ -65,7 +127,7 @@ impl Method for Sample {
     }
 }
 
-pub fn condition(entries: &[(&str, &[Value])]) -> Condition {
+pub(crate) fn condition(entries: &[(&str, &[Value])]) -> Condition {
     entries
         .iter()
         .map(|(axis, values)| (axis.to_string(), values.to_vec()))
@@ -73,7 +135,7 @@ pub fn condition(entries: &[(&str, &[Value])]) -> Condition {
 }
 
 /// A row with an outcome.
-pub fn row(name: &str, axes: &[(&str, Value)], metrics: &[(&str, f64)]) -> Row {
+pub(crate) fn row(name: &str, axes: &[(&str, Value)], metrics: &[(&str, f64)]) -> Row {
     Row {
         name: name.into(),
         axes: axes
@@ -131,7 +193,7 @@ pub fn row(name: &str, axes: &[(&str, Value)], metrics: &[(&str, f64)]) -> Row {
 }
 
 /// A row without an outcome.
-pub fn ended(name: &str, axes: &[(&str, Value)], status: Status, stop: &str, reason: &str) -> Row {
+pub(crate) fn ended(name: &str, axes: &[(&str, Value)], status: Status, stop: &str, reason: &str) -> Row {
     let mut row = row(name, axes, &[]);
     row.record.result.status = status;
     row.record.result.stop = stop.into();
@@ -143,7 +205,7 @@ pub fn ended(name: &str, axes: &[(&str, Value)], status: Status, stop: &str, rea
 }
 
 /// Two models, four energies; one job of each other end.
-pub fn rows() -> Vec<Row> {
+pub(crate) fn rows() -> Vec<Row> {
     let axes = |model: &str, energy: &str| [("model", json!(model)), ("energy", json!(energy))];
     let mut rows = Vec::new();
     for (model, factor) in [("ball", 1.0), ("duck", 1.7)] {
@@ -208,7 +270,7 @@ pub fn rows() -> Vec<Row> {
     rows
 }
 
-pub fn published() -> Published {
+pub(crate) fn published() -> Published {
     let row = |energy: &str, d_aa: f64, d_ma: f64, seconds: u32| {
         BTreeMap::from([
             ("model".to_string(), json!("ball")),
@@ -229,7 +291,7 @@ pub fn published() -> Published {
     }
 }
 
-pub fn experiment() -> Experiment {
+pub(crate) fn experiment() -> Experiment {
     Experiment {
         name: "sample".into(),
         title: "Energies on one volumetric map".into(),
@@ -315,7 +377,7 @@ pub fn experiment() -> Experiment {
 }
 
 /// A study of an error against h for two families and three seeds: slopes 2 and 1.5.
-pub fn study() -> (Vec<Row>, Rate) {
+pub(crate) fn study() -> (Vec<Row>, Rate) {
     let mut rows = Vec::new();
     for (family, slope) in [("even", 2.0), ("random", 1.5)] {
         for seed in 1..=3 {
@@ -344,125 +406,4 @@ pub fn study() -> (Vec<Row>, Rate) {
         }),
     };
     (rows, rate)
-}
-
-/// Bytes in a file of their own, as a store holds them.
-pub fn stored(bytes: &[u8]) -> PathBuf {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("stored");
-    std::fs::create_dir_all(&folder).expect("a folder");
-    let path = folder.join(vargeo::experiment::job::sha256(bytes));
-    let mut file = tempfile::NamedTempFile::new_in(&folder).expect("a file");
-    std::io::Write::write_all(&mut file, bytes).expect("room for it");
-    file.persist(&path).expect("a file");
-    path
-}
-
-/// A grid of six tetrahedra a cell mapped onto a bulging, twisted one, as a VTU file with the fields of a map.
-pub fn mesh(size: u32, twist: f64) -> Vec<u8> {
-    let at = |i: u32, j: u32, k: u32| (k * (size + 1) + j) * (size + 1) + i;
-    let mut state = 12_345u64;
-    let mut random = move || {
-        state = state
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        (state >> 40) as f64 / f64::from(1 << 24) - 0.5
-    };
-    let mut source = Vec::new();
-    let mut image = Vec::new();
-    for k in 0..=size {
-        for j in 0..=size {
-            for i in 0..=size {
-                let place = [i, j, k].map(|index| 2.0 * f64::from(index) / f64::from(size) - 1.0);
-                let inner = [i, j, k].iter().all(|index| *index > 0 && *index < size);
-                let shake = if inner { 0.5 / f64::from(size) } else { 0.0 };
-                let place = place.map(|part| part + shake * random());
-                let [x, y, z] = place;
-                // The cube onto the ball, then twisted about the third axis.
-                let ball = [
-                    x * (1.0 - y * y / 2.0 - z * z / 2.0 + y * y * z * z / 3.0).sqrt(),
-                    y * (1.0 - z * z / 2.0 - x * x / 2.0 + z * z * x * x / 3.0).sqrt(),
-                    z * (1.0 - x * x / 2.0 - y * y / 2.0 + x * x * y * y / 3.0).sqrt(),
-                ];
-                let (sine, cosine) = (twist * ball[2]).sin_cos();
-                source.push(place);
-                image.push([
-                    cosine * ball[0] - sine * ball[1],
-                    sine * ball[0] + cosine * ball[1],
-                    ball[2],
-                ]);
-            }
-        }
-    }
-    let mut cells: Vec<[u32; 4]> = Vec::new();
-    for k in 0..size {
-        for j in 0..size {
-            for i in 0..size {
-                let corner = |bits: u32| at(i + (bits & 1), j + (bits >> 1 & 1), k + (bits >> 2));
-                for (first, second) in [(1, 3), (3, 2), (2, 6), (6, 4), (4, 5), (5, 1)] {
-                    cells.push([corner(0), corner(first), corner(second), corner(7)]);
-                }
-            }
-        }
-    }
-    let determinant = |points: &[[f64; 3]], cell: &[u32; 4]| {
-        let edge =
-            |index: usize| [0, 1, 2].map(|axis| points[cell[index] as usize][axis] - points[cell[0] as usize][axis]);
-        let (a, b, c) = (edge(1), edge(2), edge(3));
-        a[0] * (b[1] * c[2] - b[2] * c[1]) - a[1] * (b[0] * c[2] - b[2] * c[0]) + a[2] * (b[0] * c[1] - b[1] * c[0])
-    };
-    let determinants: Vec<f64> = cells
-        .iter()
-        .map(|cell| determinant(&image, cell) / determinant(&source, cell))
-        .collect();
-    let edges = |points: &[[f64; 3]], cell: &[u32; 4]| {
-        let mut sum = 0.0;
-        for i in 0..4 {
-            for j in 0..i {
-                sum += (0..3)
-                    .map(|axis| (points[cell[i] as usize][axis] - points[cell[j] as usize][axis]).powi(2))
-                    .sum::<f64>();
-            }
-        }
-        sum
-    };
-    let angle: Vec<f64> = cells
-        .iter()
-        .zip(&determinants)
-        .map(|(cell, det)| edges(&image, cell) / edges(&source, cell) / det.abs().max(1e-9).powf(2.0 / 3.0))
-        .collect();
-    let volume: Vec<f64> = determinants
-        .iter()
-        .map(|det| det.abs().max(1e-12).max(1.0 / det.abs().max(1e-12)))
-        .collect();
-    let density: Vec<f64> = angle
-        .iter()
-        .zip(&volume)
-        .map(|(angle, volume)| angle * angle + volume)
-        .collect();
-    let jacobian: Vec<f64> = determinants
-        .iter()
-        .zip(&angle)
-        .map(|(det, angle)| det.signum() / angle)
-        .collect();
-    let inverted: Vec<f64> = determinants
-        .iter()
-        .enumerate()
-        .map(|(index, det)| f64::from(u8::from(*det <= 0.0 || index % 977 == 5)))
-        .collect();
-    vtu::write(
-        &image,
-        Cells {
-            tetrahedra: &cells,
-            ..Cells::default()
-        },
-        &[("source", 3, source.as_flattened())],
-        &[
-            ("angle_distortion", 1, &angle),
-            ("volume_distortion", 1, &volume),
-            ("determinant", 1, &determinants),
-            ("energy_density", 1, &density),
-            ("scaled_jacobian", 1, &jacobian),
-            ("inverted", 1, &inverted),
-        ],
-    )
 }

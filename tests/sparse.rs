@@ -1,29 +1,13 @@
 //! Sparse block systems: against dense algebra, against their own residual, and the same bits with any number of threads.
 
+use crate::sample::{Noise, with_threads};
 use vargeo::linalg::sparse::{BlockCholesky, BlockPattern, Elimination, Graph, PatternError, nested_dissection};
+use vargeo::mesh::generate::lattice::kuhn;
 
 /// A cube of `n^3` cubes, six tetrahedra each around the main diagonal.
-pub fn grid(n: usize) -> (Vec<[f64; 3]>, Vec<[u32; 4]>) {
-    let m = n + 1;
-    let points = (0..m * m * m)
-        .map(|v| [v % m, v / m % m, v / m / m].map(|c| c as f64 / n as f64))
-        .collect();
-    let mut cells = Vec::new();
-    for cube in 0..n * n * n {
-        let corner = [cube % n, cube / n % n, cube / n / n];
-        for axes in [[0, 1, 2], [1, 2, 0], [2, 0, 1], [0, 2, 1], [2, 1, 0], [1, 0, 2]] {
-            let mut at = corner;
-            let mut cell = [0u32; 4];
-            let name = |at: [usize; 3]| (at[0] + m * (at[1] + m * at[2])) as u32;
-            cell[0] = name(at);
-            for (place, axis) in axes.into_iter().enumerate() {
-                at[axis] += 1;
-                cell[place + 1] = name(at);
-            }
-            cells.push(cell);
-        }
-    }
-    (points, cells)
+fn grid(n: usize) -> (Vec<[f64; 3]>, Vec<[u32; 4]>) {
+    let mesh = kuhn(n);
+    (mesh.points, mesh.cells)
 }
 
 fn inside(points: &[[f64; 3]]) -> Vec<bool> {
@@ -34,13 +18,9 @@ fn inside(points: &[[f64; 3]]) -> Vec<bool> {
 }
 
 /// Numbers in (-1, 1), the same on every run.
-fn noise(count: usize, mut seed: u64) -> Vec<f64> {
-    (0..count)
-        .map(|_| {
-            seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            (seed >> 11) as f64 / (1u64 << 52) as f64 - 1.0
-        })
-        .collect()
+fn noise(count: usize, seed: u64) -> Vec<f64> {
+    let mut noise = Noise(seed);
+    (0..count).map(|_| noise.number()).collect()
 }
 
 /// For each cell a positive definite matrix `M M^T + I` as its ten blocks.
@@ -201,8 +181,7 @@ fn known_signs_give_the_same_bits_with_any_number_of_threads() {
     let (points, cells) = grid(13);
     let graph = Graph::of_cells(points.len(), &cells, Some);
     let solve = |threads: usize| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| {
+        with_threads(threads, || {
             let pattern = BlockPattern::<3>::of_graph(&graph, &nested_dissection(&graph, &points));
             let mut values = vec![0.0; pattern.values_len()];
             for vertex in 0..graph.len() {
@@ -341,8 +320,7 @@ fn the_same_bits_with_any_number_of_threads() {
     let free = inside(&points);
     let parts: Vec<f64> = parts::<3, 4>(64).into_iter().cycle().take(90 * cells.len()).collect();
     let solve = |threads: usize| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| {
+        with_threads(threads, || {
             let pattern = BlockPattern::<3>::new(&points, &cells, &free).unwrap();
             let mut values = vec![0.0; pattern.values_len()];
             pattern.assemble(&parts, &mut values);

@@ -1,6 +1,8 @@
 //! Voronoi squared distance terms: stored reference values, derivatives and their order, invariance, one result for any
 //! number of threads.
 
+use crate::connectivity::torus;
+use crate::sample::{Noise, with_threads};
 use serde_json::Value;
 use vargeo::geometry::point_tree::PointTree;
 use vargeo::geometry::restricted_voronoi::Compatibility;
@@ -125,18 +127,6 @@ fn printed_gradient() {
     }
 }
 
-/// Deterministic numbers in (-1, 1).
-fn noise(count: usize, seed: u64) -> Vec<[f64; 3]> {
-    let mut state = seed;
-    let mut next = || {
-        state = state
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        (state >> 11) as f64 / (1u64 << 52) as f64 - 1.0
-    };
-    (0..count).map(|_| std::array::from_fn(|_| next())).collect()
-}
-
 /// Every derivative, with every option, against central differences of the value.
 #[test]
 fn derivatives() {
@@ -144,12 +134,17 @@ fn derivatives() {
     let (points, cells) = &sample.template;
     let mut term = SquaredDistance::new(points, cells).expect("a valid surface");
     let sites = &sample.samples;
-    let normals: Vec<[f64; 3]> = noise(sites.len(), 5)
+    let normals: Vec<[f64; 3]> = Noise(5)
+        .points(sites.len())
         .iter()
         .zip(&sample.normals)
         .map(|(noise, normal)| unit(std::array::from_fn(|k| normal[k] + 0.3 * noise[k])))
         .collect();
-    let moves = [noise(points.len(), 1), noise(sites.len(), 2), noise(sites.len(), 3)];
+    let moves = [
+        Noise(1).points(points.len()),
+        Noise(2).points(sites.len()),
+        Noise(3).points(sites.len()),
+    ];
     let shifted = |x: &[[f64; 3]], direction: &[[f64; 3]], t: f64| -> Vec<[f64; 3]> {
         x.iter()
             .zip(direction)
@@ -218,11 +213,10 @@ fn derivatives() {
     }
 }
 
-/// A bumpy torus.
-fn torus(n: usize, m: usize) -> (Vec<[f64; 3]>, Vec<[u32; 3]>) {
-    let (mut points, mut cells) = (Vec::new(), Vec::new());
-    let noise = noise(n * m, 9);
-    let at = |i: usize, j: usize| ((i % n) * m + j % m) as u32;
+/// A torus with bumps.
+fn bumpy_torus(n: usize, m: usize) -> (Vec<[f64; 3]>, Vec<[u32; 3]>) {
+    let mut points = Vec::new();
+    let noise = Noise(9).points(n * m);
     for i in 0..n {
         for j in 0..m {
             let (a, b) = (
@@ -235,29 +229,23 @@ fn torus(n: usize, m: usize) -> (Vec<[f64; 3]>, Vec<[u32; 3]>) {
                 (1.0 + radius * b.cos()) * a.sin(),
                 radius * b.sin(),
             ]);
-            cells.push([at(i, j), at(i + 1, j), at(i + 1, j + 1)]);
-            cells.push([at(i, j), at(i + 1, j + 1), at(i, j + 1)]);
         }
     }
-    (points, cells)
+    (points, torus(n as u32, m as u32))
 }
 
 #[test]
 fn same_bits_for_any_number_of_threads() {
-    let (points, cells) = torus(60, 30);
+    let (points, cells) = bumpy_torus(60, 30);
     let sites: Vec<[f64; 3]> = points
         .iter()
         .step_by(3)
-        .zip(noise(600, 4))
+        .zip(Noise(4).points(600))
         .map(|(x, d)| std::array::from_fn(|k| x[k] + 0.03 * d[k]))
         .collect();
-    let normals: Vec<[f64; 3]> = noise(sites.len(), 6).into_iter().map(unit).collect();
+    let normals: Vec<[f64; 3]> = Noise(6).points(sites.len()).into_iter().map(unit).collect();
     let run = |threads: usize| {
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build()
-            .expect("threads");
-        pool.install(|| {
+        with_threads(threads, || {
             let mut term = SquaredDistance::new(&points, &cells).expect("a valid surface");
             let mut surface = vec![[0.0; 3]; points.len()];
             let mut by_sites = vec![[0.0; 3]; sites.len()];
@@ -294,7 +282,7 @@ fn same_bits_for_any_number_of_threads() {
 /// Moving the surface and the sites together changes nothing: values agree, gradients turn along.
 #[test]
 fn rigid_motions() {
-    let (points, cells) = torus(30, 15);
+    let (points, cells) = bumpy_torus(30, 15);
     let sites: Vec<[f64; 3]> = points.iter().step_by(4).copied().collect();
     let turn = |x: [f64; 3]| {
         let (s, c) = 0.7f64.sin_cos();
@@ -336,7 +324,7 @@ fn rigid_motions() {
 /// Steps that leave the world behind: an infinite value, which a line search takes for too long a step.
 #[test]
 fn values_beyond_measure() {
-    let (points, cells) = torus(6, 5);
+    let (points, cells) = bumpy_torus(6, 5);
     let mut term = SquaredDistance::new(&points, &cells).expect("a valid surface");
     let mut value = |points: &[[f64; 3]], sites: &[[f64; 3]]| {
         term.evaluate(points, &PointTree::new(sites), &Options::default(), Wanted::default())

@@ -10,7 +10,7 @@ use vargeo::experiment::record::{JobResult, Measurement, RECORD_SCHEMA, Record, 
 use vargeo::run::store::{GarbageKind, Lookup, MESH, Publication, Step, Store};
 
 /// A record of a made-up job; `value` decides its result, `measured` its measurement.
-pub fn record(name: &str, value: f64, measured: i64, mesh: &[u8]) -> Record {
+pub(crate) fn record(name: &str, value: f64, measured: i64, mesh: &[u8]) -> Record {
     let job = Job {
         record_schema: RECORD_SCHEMA,
         method: "made-up".into(),
@@ -49,7 +49,7 @@ pub fn record(name: &str, value: f64, measured: i64, mesh: &[u8]) -> Record {
 }
 
 /// A folder in memory where there is such a thing, for syncing to a disk takes long; else a usual one.
-pub fn folder() -> tempfile::TempDir {
+pub(crate) fn folder() -> tempfile::TempDir {
     tempfile::tempdir_in("/dev/shm").unwrap_or_else(|_| tempfile::tempdir().expect("a temporary folder"))
 }
 
@@ -329,7 +329,7 @@ fn an_error_at_any_step_is_told_and_loses_nothing() {
 }
 
 /// This test binary as a process of its own that runs one of its functions.
-pub fn this_test(function: &str, variable: &str, value: &str) -> Command {
+pub(crate) fn this_test(function: &str, variable: &str, value: &str) -> Command {
     let mut command = Command::new(std::env::current_exe().unwrap());
     command.args([function, "--exact", "--nocapture", "--quiet"]);
     command.env(variable, value).stdin(Stdio::null()).stdout(Stdio::null());

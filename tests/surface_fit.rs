@@ -1,5 +1,6 @@
 //! Surface fits: exact gradients, a fit of known quality, damaged targets, and the same bits with any number of threads.
 
+use crate::sample::{self, file, generated, with_threads};
 use serde_json::{Value, json};
 use vargeo::mesh::connectivity::surface_topology;
 use vargeo::mesh::generate::shape::{generate_shape, shapes};
@@ -7,31 +8,16 @@ use vargeo::mesh::generate::template::{generate_template, templates};
 use vargeo::mesh::mixed::MixedMesh;
 use vargeo::mesh::surface::Surface;
 use vargeo::mesh::template::voxels;
-use vargeo::method::model::{LoadedModel, Part};
+use vargeo::method::model::Part;
 use vargeo::method::surface_fit::objective::{FitObjective, Target};
 use vargeo::method::surface_fit::settings::{Settings, Stage};
 use vargeo::method::surface_fit::{SurfaceFit, fitted_mesh, sampling};
-use vargeo::method::{Inputs, Method, Outcome};
+use vargeo::method::{Method, Outcome};
 use vargeo::optimize::{Objective, Silent};
 
-fn generated(generator: &str, parameters: Value) -> Part {
-    Part::Generated {
-        generator: generator.to_string(),
-        parameters,
-    }
-}
-
 fn fit(target: Part, template: Part, settings: Value) -> Result<Outcome, String> {
-    let model = LoadedModel {
-        parts: [("target".to_string(), target), ("template".to_string(), template)].into(),
-    };
-    let inputs = Inputs {
-        settings: &settings,
-        model,
-    };
-    SurfaceFit
-        .run(inputs, &mut Silent)
-        .map_err(|failure| format!("{}: {}", failure.kind, failure.reason))
+    let model = sample::model([("target", target), ("template", template)]);
+    sample::run(&SurfaceFit, model, settings).map_err(|failure| format!("{}: {}", failure.kind, failure.reason))
 }
 
 #[test]
@@ -144,18 +130,13 @@ fn damaged_targets_end_with_a_fit_and_wrong_templates_with_a_verdict() {
 #[test]
 fn bad_models_are_refused_with_the_reason() {
     let template = || generated("box", json!({}));
-    let file = |text: &str| Part::File {
-        name: "bad.obj".to_string(),
-        bytes: text.as_bytes().to_vec(),
-        parameters: json!({}),
-    };
     for (text, expected) in [
         ("v 0 0 0\nv 1 0 0\nv 0 1 0\n", "no cloud"),
         ("v 0 0 0\nv 1 0 0\nv 0 1 0\nv nan 1 0\n", "bad.obj"),
         ("v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n", "area"),
         ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", "bad.obj"),
     ] {
-        let error = fit(file(text), template(), json!({})).unwrap_err();
+        let error = fit(file("bad.obj", text), template(), json!({})).unwrap_err();
         assert!(error.contains(expected), "{error}");
     }
 }
@@ -163,11 +144,7 @@ fn bad_models_are_refused_with_the_reason() {
 /// A text of points, and the points of a shape, are fitted without a surface; bad lines are named.
 #[test]
 fn clouds_are_fitted() {
-    let cloud = |text: String| Part::File {
-        name: "cloud.xyz".to_string(),
-        bytes: text.into_bytes(),
-        parameters: json!({}),
-    };
+    let cloud = |text: &str| file("cloud.xyz", text);
     let settings = json!({ "subdivisions": 1, "iteration_limit": 40 });
     let template = || generated("box", json!({ "quads": 54 }));
     let shape = generate_shape("ellipsoid", &json!({ "triangles": 2000 })).unwrap();
@@ -177,7 +154,7 @@ fn clouds_are_fitted() {
         .map(|[x, y, z]| format!("{x} {y} {z} 0.5"))
         .collect();
     let outcome = fit(
-        cloud(format!("# points\n{}\n", lines.join("\n"))),
+        cloud(&format!("# points\n{}\n", lines.join("\n"))),
         template(),
         settings.clone(),
     )
@@ -200,7 +177,7 @@ fn clouds_are_fitted() {
         ("1 2 3\n1 2 4\n", "no cloud"),
         ("", "no points"),
     ] {
-        let error = fit(cloud(text.to_string()), template(), json!({})).unwrap_err();
+        let error = fit(cloud(text), template(), json!({})).unwrap_err();
         assert!(error.contains(expected), "{error}");
     }
 }
@@ -208,8 +185,7 @@ fn clouds_are_fitted() {
 #[test]
 fn same_bits_with_any_number_of_threads() {
     let run = |threads: usize| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| {
+        with_threads(threads, || {
             fit(
                 generated("sharp-sphere", json!({ "triangles": 1500 })),
                 generated("box", json!({ "quads": 24 })),

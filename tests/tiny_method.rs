@@ -7,10 +7,10 @@ use vargeo::method::{Failure, Inputs, Method, Outcome};
 use vargeo::metric::{Better, Metric};
 use vargeo::optimize::Observer;
 
-pub struct Tiny;
+pub(crate) struct Tiny;
 
 /// The methods that tests read files with.
-pub const METHODS: &[&'static dyn Method] = &[&Tiny];
+pub(crate) const METHODS: &[&'static dyn Method] = &[&Tiny];
 
 const POSITIVE: Kind = Kind::Number {
     min: f64::MIN_POSITIVE,
@@ -32,7 +32,7 @@ fn energies() -> Vec<(&'static str, String)> {
         .to_vec()
 }
 
-pub static SETTINGS: &[Field] = &[
+pub(crate) static SETTINGS: &[Field] = &[
     field("energy", Kind::Named(energies), Default::Text("stretch")),
     field("order", Kind::Integer { min: 1, max: 16 }, Default::Integer(2)),
     field("lambda", Kind::Number { min: 0.0, max: 100.0 }, Default::Number(0.5)),

@@ -1,6 +1,7 @@
 //! Files of curved volumes: the order of points that VTK 9.7 and Gmsh 4.15 state themselves, one point where cells
 //! meet, and coefficients that come back to the last bit or not at all.
 
+use crate::sample::Noise;
 use proptest::prelude::*;
 use std::collections::BTreeMap;
 use vargeo::fem::basis;
@@ -10,6 +11,7 @@ use vargeo::fem::lagrange::lagrange;
 use vargeo::fem::space::Space;
 use vargeo::mesh::curved::{lattice, places};
 use vargeo::mesh::format::{gmsh, vtu};
+use vargeo::mesh::generate::lattice::kuhn;
 use vargeo::mesh::mixed::{MixedMesh, Shape};
 use vargeo::mesh::template::{collapse, grid};
 
@@ -55,22 +57,11 @@ fn points_are_listed_as_vtk_and_gmsh_list_them() {
 fn mixed() -> MixedMesh {
     let mut mesh = collapse::collapse(&grid::grid([2, 2, 1]), 0, [[0.0, 0.0, 0.0], [1.0, 0.0, 1.0]]).unwrap();
     let first = mesh.points.len() as u32;
-    for corner in 0..8_u32 {
-        let bit = |place: u32| f64::from(corner >> place & 1);
-        mesh.points.push([5.0 + bit(0), bit(1), bit(2)]);
-    }
-    for path in [[1, 2, 4], [1, 4, 2], [2, 1, 4], [2, 4, 1], [4, 1, 2], [4, 2, 1]] {
-        let [a, b, _] = path;
-        let mut corners = [0, a, a + b, 7].map(|corner: u32| first + corner);
-        let points = corners.map(|corner| mesh.points[corner as usize]);
-        let edge = |end: usize| -> [f64; 3] { std::array::from_fn(|axis| points[end][axis] - points[0][axis]) };
-        let [u, v, w] = [edge(1), edge(2), edge(3)];
-        let determinant = u[0] * (v[1] * w[2] - v[2] * w[1]) - u[1] * (v[0] * w[2] - v[2] * w[0])
-            + u[2] * (v[0] * w[1] - v[1] * w[0]);
-        if determinant < 0.0 {
-            corners.swap(2, 3);
-        }
-        mesh.push(Shape::Tetrahedron, &corners);
+    let cube = kuhn(1);
+    mesh.points
+        .extend(cube.points.iter().map(|[x, y, z]| [5.0 + x, *y, *z]));
+    for cell in cube.cells {
+        mesh.push(Shape::Tetrahedron, &cell.map(|corner| first + corner));
     }
     mesh
 }
@@ -134,10 +125,9 @@ proptest! {
         let own: Vec<usize> = (0..mesh.cells()).map(|cell| orders[cell % orders.len()]).collect();
         let space = Space::new(&mesh, &topology, basis::bases()[1], &own).unwrap();
         let mut x = space.linear(&mesh.points);
-        let mut state = seed | 1;
+        let mut noise = Noise(seed);
         for value in &mut x[3 * mesh.points.len()..] {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
-            *value = (state as f64) * 1e-21 - 0.3;
+            *value = 0.01 * noise.number() - 0.3;
         }
         let bytes = coefficient_file::write(&mesh, &space, &x);
         let volume = coefficient_file::read(&bytes).unwrap();

@@ -1,5 +1,6 @@
-//! Fits of small volumes: what is promised of them, templates by recipes, and certificates against stored verdicts.
+//! Fits of small volumes: what is promised of them, templates by recipes and from files, input that is refused.
 
+use crate::sample::{self, file, generated, metric_bits, model, with_threads};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use vargeo::fem::basis;
@@ -10,36 +11,23 @@ use vargeo::mesh::TriangleMesh;
 use vargeo::mesh::format::Content;
 use vargeo::mesh::mixed::MixedMesh;
 use vargeo::mesh::template::{carve, collapse, extrude, grid, pillow, voxels};
-use vargeo::method::model::{LoadedModel, Part};
 use vargeo::method::volume_fit::{VolumeFit, orientation};
-use vargeo::method::{Failure, Inputs, Method, Outcome};
-use vargeo::optimize::Silent;
+use vargeo::method::{Failure, Outcome};
 
 fn fit(template: Value, target: Option<Value>, settings: Value) -> Result<Outcome, Failure> {
-    let generated = |mut table: Value, key: &str| {
+    let part = |mut table: Value, key: &str| {
         let name = table.as_object_mut().unwrap().remove(key).unwrap();
-        Part::Generated {
-            generator: name.as_str().unwrap().to_string(),
-            parameters: table,
-        }
+        generated(name.as_str().unwrap(), table)
     };
-    let mut parts = BTreeMap::new();
-    parts.insert("template".to_string(), generated(template, "generate"));
-    if let Some(target) = target {
-        parts.insert("target".to_string(), generated(target, "shape"));
-    }
-    let inputs = Inputs {
-        settings: &settings,
-        model: LoadedModel { parts },
-    };
-    VolumeFit.run(inputs, &mut Silent)
+    let target = target.map(|target| ("target", part(target, "shape")));
+    let parts = [("template", part(template, "generate"))].into_iter().chain(target);
+    sample::run(&VolumeFit, model(parts), settings)
 }
 
 #[test]
 fn a_fit_is_valid_falls_in_every_stage_and_is_the_same_with_any_number_of_threads() {
     let run = |threads: usize| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| {
+        with_threads(threads, || {
             fit(
                 json!({ "generate": "grid", "x": 1, "y": 1, "z": 1, "recipe": [{ "op": "pillow" }] }),
                 Some(json!({ "shape": "ellipsoid", "triangles": 400 })),
@@ -65,14 +53,7 @@ fn a_fit_is_valid_falls_in_every_stage_and_is_the_same_with_any_number_of_thread
     );
     let other = run(2);
     assert_eq!(outcome.mesh, other.mesh);
-    let bits = |outcome: &Outcome| {
-        outcome
-            .metrics
-            .values()
-            .map(|value| value.to_bits())
-            .collect::<Vec<_>>()
-    };
-    assert_eq!(bits(&outcome), bits(&other));
+    assert_eq!(metric_bits(&outcome), metric_bits(&other));
 }
 
 #[test]
@@ -146,31 +127,21 @@ fn bad_input_is_named() {
     assert!(reason(voxels).contains("need a target surface"));
 
     // Files, which nothing has looked at before.
-    let file = |template: &str, target: &str| {
-        let part = |name: &str, text: &str| Part::File {
-            name: name.to_string(),
-            bytes: text.as_bytes().to_vec(),
-            parameters: json!({}),
-        };
-        let mut parts = BTreeMap::new();
-        parts.insert("template".to_string(), part("template.mesh", template));
-        if !target.is_empty() {
-            parts.insert("target".to_string(), part("target.obj", target));
-        }
-        let inputs = Inputs {
-            settings: &json!({ "order": 1, "iteration_limit": 3 }),
-            model: LoadedModel { parts },
-        };
-        VolumeFit.run(inputs, &mut Silent)
+    let files = |template: &str, target: &str| {
+        let target = (!target.is_empty()).then(|| ("target", file("target.obj", target)));
+        let parts = [("template", file("template.mesh", template))]
+            .into_iter()
+            .chain(target);
+        sample::run(&VolumeFit, model(parts), json!({ "order": 1, "iteration_limit": 3 }))
     };
     let cube = "MeshVersionFormatted 2\nDimension 3\nVertices\n8\n0 0 0 0\n1 0 0 0\n1 1 0 0\n0 1 0 0\n0 0 1 0\n1 0 1 0\n1 1 1 0\n0 1 1 0\n";
     let crack = cube.replace("Vertices\n8", "Vertices\n9").to_string()
         + "2 0.5 0.5 0\nHexahedra\n1\n1 2 3 4 5 6 7 8 0\nTetrahedra\n2\n2 3 7 9 0\n2 7 6 9 0\nEnd\n";
-    let found = reason(file(&crack, ""));
+    let found = reason(files(&crack, ""));
     assert!(found.contains("lies on the quad"), "{found}");
     let whole = format!("{cube}Hexahedra\n1\n1 2 3 4 5 6 7 8 0\nEnd\n");
     let corners = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n";
-    let notices = |target: &str| file(&whole, target).unwrap().notices.join("; ");
+    let notices = |target: &str| files(&whole, target).unwrap().notices.join("; ");
     let closed = format!("{corners}f 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n");
     assert!(!notices(&closed).contains("does not enclose"));
     let turned = format!("{corners}f 1 2 3\nf 1 4 2\nf 2 4 3\nf 3 4 1\n");
@@ -382,30 +353,14 @@ fn a_shell_takes_its_thickness_and_leaves_the_surface_where_it_is() {
 
 #[test]
 fn a_coefficient_file_is_a_template() {
-    let part = |bytes: Vec<u8>| Part::File {
-        name: "start.coefficients".to_string(),
-        bytes,
-        parameters: json!({}),
-    };
     let settings = json!({ "order": 3, "iteration_limit": 20 });
     let target = json!({ "shape": "ellipsoid", "triangles": 400 });
     let template = json!({ "generate": "grid", "x": 1, "y": 1, "z": 1, "recipe": [{ "op": "pillow" }] });
     let first = fit(template, Some(target), settings).unwrap();
     let again = |settings: Value, bytes: Vec<u8>| {
-        let mut parts = BTreeMap::new();
-        parts.insert("template".to_string(), part(bytes));
-        parts.insert(
-            "target".to_string(),
-            Part::Generated {
-                generator: "ellipsoid".to_string(),
-                parameters: json!({ "triangles": 400 }),
-            },
-        );
-        let inputs = Inputs {
-            settings: &settings,
-            model: LoadedModel { parts },
-        };
-        VolumeFit.run(inputs, &mut Silent)
+        let template = ("template", file("start.coefficients", bytes));
+        let target = ("target", generated("ellipsoid", json!({ "triangles": 400 })));
+        sample::run(&VolumeFit, model([template, target]), settings)
     };
     let bytes = first.files["coefficients"].clone();
     // Nothing moves: the same volume, with the orders of the file.

@@ -1,17 +1,17 @@
-//! Volumetric maps against stored figures of an independent program, and the promises of the method.
+//! Volumetric maps against stored figures of an independent program, and what the method takes and refuses.
 
+use crate::sample::{file, generated, model};
 use serde_json::{Value, json};
-use std::cell::Cell;
 use vargeo::energy::mapping::{Density, MappingEnergy};
 use vargeo::mesh::TetrahedralMesh;
 use vargeo::mesh::connectivity;
 use vargeo::mesh::target::Target;
-use vargeo::method::model::{LoadedModel, Part};
+use vargeo::method::model::LoadedModel;
 use vargeo::method::volume_map::problem::Problem;
 use vargeo::method::volume_map::settings::Settings;
 use vargeo::method::volume_map::{self, VolumeMap, harmonic, outcome, similarity};
 use vargeo::method::{Failure, Inputs, Method, Outcome};
-use vargeo::optimize::{Iterate, Observer, Silent, StopReason};
+use vargeo::optimize::{Observer, Silent};
 
 fn golden() -> Value {
     serde_json::from_str(include_str!("golden/tetmap.json")).expect("the stored file is valid JSON")
@@ -21,38 +21,36 @@ fn points(value: &Value) -> Vec<[f64; 3]> {
     serde_json::from_value(value.clone()).expect("rows of three numbers")
 }
 
-fn settings(value: Value) -> Settings {
+pub(crate) fn settings(value: Value) -> Settings {
     Settings::resolve(&value).expect("valid settings")
 }
 
-/// The stored problem: a mesh of volume 1 and the places of its boundary on the unit cube.
-fn stored(chosen: &Settings) -> Problem {
+/// A mesh of volume 1.
+fn stored_mesh() -> TetrahedralMesh {
     let golden = golden();
-    let cells: Vec<[u32; 4]> = serde_json::from_value(golden["T"].clone()).expect("rows of four indices");
-    let mesh = TetrahedralMesh {
+    TetrahedralMesh {
         points: points(&golden["X"]),
-        cells,
-    };
-    let boundary = connectivity::boundary(&mesh.cells, mesh.points.len());
-    let places = points(&golden["target"]);
-    let positions = boundary
-        .vertices
-        .iter()
-        .map(|&vertex| places[vertex as usize])
-        .collect();
-    Problem::from_parts(
-        mesh,
-        Target {
-            positions,
-            interior: None,
-        },
-        chosen,
-        Vec::new(),
-    )
-    .expect("a sound problem")
+        cells: serde_json::from_value(golden["T"].clone()).expect("rows of four indices"),
+    }
 }
 
-fn close(name: &str, value: f64, expected: f64, tolerance: f64) {
+/// The places of a mesh's boundary among those of all its vertices.
+pub(crate) fn target_of(mesh: &TetrahedralMesh, places: &[[f64; 3]]) -> Target {
+    let boundary = connectivity::boundary(&mesh.cells, mesh.points.len());
+    Target {
+        positions: boundary.vertices.iter().map(|&v| places[v as usize]).collect(),
+        interior: None,
+    }
+}
+
+/// The stored problem: a mesh and the places of its boundary on the unit cube.
+fn stored(chosen: &Settings) -> Problem {
+    let mesh = stored_mesh();
+    let target = target_of(&mesh, &points(&golden()["target"]));
+    Problem::from_parts(mesh, target, chosen, Vec::new()).expect("a sound problem")
+}
+
+pub(crate) fn close(name: &str, value: f64, expected: f64, tolerance: f64) {
     assert!(
         (value - expected).abs() <= tolerance,
         "{name}: {value} instead of {expected}"
@@ -60,18 +58,14 @@ fn close(name: &str, value: f64, expected: f64, tolerance: f64) {
 }
 
 /// The standard case of published tables: a bumpy twisted grid onto a cube with swirled faces.
-fn onto_cube(generator: &str, parameters: Value, cube: Value) -> LoadedModel {
-    let mut model = LoadedModel::default();
-    let generated = |generator: &str, parameters: Value| Part::Generated {
-        generator: generator.into(),
-        parameters,
-    };
-    model.parts.insert("mesh".into(), generated(generator, parameters));
-    model.parts.insert("target".into(), generated("cube", cube));
-    model
+pub(crate) fn onto_cube(generator: &str, parameters: Value, cube: Value) -> LoadedModel {
+    model([
+        ("mesh", generated(generator, parameters)),
+        ("target", generated("cube", cube)),
+    ])
 }
 
-fn twisted_grid(divisions: u64) -> LoadedModel {
+pub(crate) fn twisted_grid(divisions: u64) -> LoadedModel {
     onto_cube(
         "twisted-grid",
         json!({ "divisions": divisions }),
@@ -79,7 +73,7 @@ fn twisted_grid(divisions: u64) -> LoadedModel {
     )
 }
 
-fn map(model: LoadedModel, chosen: Value, observer: &mut dyn Observer) -> Result<Outcome, Failure> {
+pub(crate) fn map(model: LoadedModel, chosen: Value, observer: &mut dyn Observer) -> Result<Outcome, Failure> {
     VolumeMap.run(
         Inputs {
             settings: &chosen,
@@ -89,7 +83,7 @@ fn map(model: LoadedModel, chosen: Value, observer: &mut dyn Observer) -> Result
     )
 }
 
-fn metric(outcome: &Outcome, name: &str) -> f64 {
+pub(crate) fn metric(outcome: &Outcome, name: &str) -> f64 {
     *outcome.metrics.get(name).unwrap_or_else(|| panic!("no metric {name}"))
 }
 
@@ -322,23 +316,10 @@ fn comparison_of_energies_holds_to_the_printed_digits() {
 #[test]
 fn affine_boundary_gives_the_affine_map_at_once() {
     let chosen = settings(json!({ "energy": "stretch", "rescale": false }));
-    let golden = golden();
-    let cells: Vec<[u32; 4]> = serde_json::from_value(golden["T"].clone()).unwrap();
-    let mesh = TetrahedralMesh {
-        points: points(&golden["X"]),
-        cells,
-    };
+    let mesh = stored_mesh();
     let affine = |[x, y, z]: [f64; 3]| [1.2 * x + 0.3 * y, -0.1 * x + 0.8 * y + 0.2 * z, 0.1 * x + 1.1 * z];
-    let boundary = connectivity::boundary(&mesh.cells, mesh.points.len());
-    let positions = boundary
-        .vertices
-        .iter()
-        .map(|&vertex| affine(mesh.points[vertex as usize]))
-        .collect();
-    let target = Target {
-        positions,
-        interior: None,
-    };
+    let places: Vec<[f64; 3]> = mesh.points.iter().map(|&point| affine(point)).collect();
+    let target = target_of(&mesh, &places);
     let problem = Problem::from_parts(mesh, target, &chosen, Vec::new()).expect("a sound problem");
     for energy in ["stretch", "symmetric-dirichlet", "arap", "mips", "lpm", "hencky"] {
         let chosen = settings(json!({ "energy": energy, "rescale": false }));
@@ -357,8 +338,7 @@ fn affine_boundary_gives_the_affine_map_at_once() {
     }
 }
 
-/// Derivatives of the weighted density by central differences, and the mean of stretch over the image as the Dirichlet
-/// energy of the inverse map.
+/// Every weighted density with its derivatives by central differences, and the energy of a map.
 #[test]
 fn target_weighting_is_the_mean_over_the_image() {
     use nalgebra::Matrix3;
@@ -401,149 +381,6 @@ fn target_weighting_is_the_mean_over_the_image() {
 }
 
 #[test]
-fn same_bits_with_any_number_of_threads() {
-    let run = |threads: usize, chosen: Value| {
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build()
-            .expect("a pool");
-        pool.install(|| map(twisted_grid(6), chosen, &mut Silent).expect("a map"))
-    };
-    for chosen in [
-        json!({ "energy": "stretch" }),
-        json!({ "energy": "arap", "solver": "l-bfgs", "iteration_limit": 30 }),
-        json!({ "energy": "stretch", "preset": "paper", "iteration_limit": 20 }),
-        json!({ "energy": "arap", "preset": "paper", "solver": "locally-injective", "iteration_limit": 10 }),
-    ] {
-        let one = run(1, chosen.clone());
-        for threads in [2, 4] {
-            let other = run(threads, chosen.clone());
-            assert!(
-                one.mesh == other.mesh,
-                "{chosen}: the mesh differs with {threads} threads"
-            );
-            let bits = |outcome: &Outcome| -> Vec<u64> {
-                let values = outcome.metrics.values().chain(outcome.traces.values().flatten());
-                values.map(|value| value.to_bits()).collect()
-            };
-            assert!(
-                bits(&one) == bits(&other),
-                "{chosen}: figures differ with {threads} threads"
-            );
-            assert_eq!(one.counters, other.counters, "{chosen}");
-        }
-    }
-}
-
-/// Asks to stop after a number of iterates.
-struct Impatient {
-    left: Cell<u64>,
-    stop: StopReason,
-}
-
-impl Observer for Impatient {
-    fn phase(&mut self, _name: &str) {}
-    fn iterate(&mut self, _iterate: &Iterate) {
-        self.left.set(self.left.get().saturating_sub(1));
-    }
-    fn stop(&self) -> Option<StopReason> {
-        (self.left.get() == 0).then_some(self.stop)
-    }
-}
-
-#[test]
-fn every_solver_tells_why_it_stopped() {
-    for solver in ["projected-newton", "relaxed-newton", "locally-injective", "l-bfgs"] {
-        let chosen = |iterations: u64| json!({ "energy": "stretch", "solver": solver, "iteration_limit": iterations });
-        let limited = map(twisted_grid(4), chosen(2), &mut Silent).expect("a map");
-        assert_eq!(limited.stop, "step-limit", "{solver}: {}", limited.reason);
-        assert_eq!(limited.counters["iterations"], 2);
-        assert_eq!(metric(&limited, "inverted"), 0.0, "{solver}");
-        let rows = limited.traces["iteration"].len();
-        assert!(
-            rows == 3 && limited.traces.values().all(|column| column.len() == rows),
-            "{solver}: {rows} rows"
-        );
-        for (stop, word) in [
-            (StopReason::TimeLimit, "time-limit"),
-            (StopReason::Cancelled, "cancelled"),
-        ] {
-            let mut impatient = Impatient {
-                left: Cell::new(1),
-                stop,
-            };
-            let stopped = map(twisted_grid(4), chosen(500), &mut impatient).expect("a map");
-            assert_eq!(stopped.stop, word, "{solver}: {}", stopped.reason);
-            assert!(stopped.mesh.is_some());
-        }
-    }
-    // Quasi-Newton with a criterion beyond the reach of rounding runs until nothing moves.
-    let stuck =
-        json!({ "energy": "arap", "gradient_tolerance": 0.0, "energy_tolerance": 0.0, "iteration_limit": 100_000 });
-    let stalled = map(twisted_grid(4), stuck, &mut Silent).expect("a map");
-    assert_eq!(stalled.stop, "stalled", "{}", stalled.reason);
-}
-
-/// LPM has no stiffness at all where the map shrinks every length below 1/sqrt 3: the positive part of its Hessian is
-/// zero.
-#[test]
-fn a_hessian_without_any_positive_part_still_gives_a_descent() {
-    for solver in ["projected-newton", "relaxed-newton"] {
-        let ball = onto_cube("ball", json!({ "tetrahedra": 96, "radius": 2.0 }), json!({}));
-        let chosen = json!({
-            "energy": "lpm", "solver": solver, "barrier": "none", "rescale": false, "iteration_limit": 50,
-            "projected-newton": { "hessian": "projected" },
-        });
-        let outcome = map(ball, chosen, &mut Silent).expect("a map");
-        assert_ne!(outcome.stop, "not-finite", "{solver}: {}", outcome.reason);
-        let energies = &outcome.traces["energy"];
-        assert!(energies.last() < energies.first(), "{solver}: {energies:?}");
-    }
-}
-
-/// MIPS comes first where the exponential of AMIPS is far beyond use on a start that is valid.
-#[test]
-fn an_energy_beyond_measure_is_approached() {
-    let bumpy = onto_cube(
-        "bumpy",
-        json!({ "tetrahedra": 4_000, "amplitude": 0.3, "twist": 300.0 }),
-        json!({ "swirl": 1.8 }),
-    );
-    let chosen = json!({ "energy": "amips", "iteration_limit": 20 });
-    let outcome = map(bumpy, chosen, &mut Silent).expect("a map");
-    assert!(outcome.counters["approach_iterations"] > 0);
-    assert_ne!(outcome.stop, "not-finite", "{}", outcome.reason);
-    assert!(metric(&outcome, "inverted") == 0.0 && metric(&outcome, "energy").is_finite());
-}
-
-/// On this body the gradient criterion stalls and relaxation gets the solver going again.
-#[test]
-fn relaxation_saves_iterations() {
-    let solve = |relaxation: bool| {
-        let bumpy = onto_cube(
-            "bumpy",
-            json!({ "tetrahedra": 1500 }),
-            json!({ "swirl": 1.0, "warp": 0.12 }),
-        );
-        let chosen = json!({ "preset": "paper", "energy": "lpm", "relaxed-newton": { "relaxation": relaxation } });
-        map(bumpy, chosen, &mut Silent).expect("a map")
-    };
-    let (with, without) = (solve(true), solve(false));
-    for outcome in [&with, &without] {
-        assert_eq!(outcome.stop, "converged", "{}", outcome.reason);
-    }
-    assert!(with.counters["relaxations"] > 0 && with.counters["relaxation_iterations"] > 0);
-    assert_eq!(without.counters["relaxations"], 0);
-    assert!(
-        with.counters["iterations"] < without.counters["iterations"],
-        "{:?} {:?}",
-        with.counters,
-        without.counters
-    );
-    close("energy", metric(&with, "energy"), metric(&without, "energy"), 1e-3);
-}
-
-#[test]
 fn an_energy_that_falls_without_bound_is_refused() {
     let wrong = |weighting: &str, energy: &str, barrier: &str| {
         let chosen = json!({ "weighting": weighting, "energy": energy, "barrier": barrier });
@@ -576,11 +413,6 @@ fn starts_and_bad_models_are_told_apart() {
         close(start, metric(&outcome, "energy"), best, 1e-7);
     }
 
-    let text = |bytes: &[u8]| Part::File {
-        name: "target.txt".into(),
-        bytes: bytes.to_vec(),
-        parameters: json!({}),
-    };
     for (bytes, word) in [
         (b"0 0 0 0\n".as_slice(), "have no target"),
         (b"0 0 0\n", "line 1"),
@@ -588,7 +420,7 @@ fn starts_and_bad_models_are_told_apart() {
         (b"999999 0 0 0\n", "out of range"),
         (b"\xff\xfe\x00", "neither a mesh nor text"),
     ] {
-        model.parts.insert("target".into(), text(bytes));
+        model.parts.insert("target".into(), file("target.txt", bytes));
         let failure = map(model.clone(), json!({}), &mut Silent).expect_err("a bad target");
         assert_eq!(failure.kind, "invalid-input");
         assert!(
@@ -598,22 +430,11 @@ fn starts_and_bad_models_are_told_apart() {
         );
     }
     // A mirror image has no map without inversions at all.
-    let golden = golden();
-    let cells: Vec<[u32; 4]> = serde_json::from_value(golden["T"].clone()).unwrap();
-    let mesh = TetrahedralMesh {
-        points: points(&golden["X"]),
-        cells,
-    };
-    let boundary = connectivity::boundary(&mesh.cells, mesh.points.len());
-    let places = points(&golden["target"]);
-    let mirrored = |factor: f64| Target {
-        positions: boundary
-            .vertices
-            .iter()
-            .map(|&v| places[v as usize])
-            .map(|[x, y, z]| [factor * x, y, z])
-            .collect(),
-        interior: None,
+    let mesh = stored_mesh();
+    let places = points(&golden()["target"]);
+    let mirrored = |factor: f64| {
+        let places: Vec<[f64; 3]> = places.iter().map(|&[x, y, z]| [factor * x, y, z]).collect();
+        target_of(&mesh, &places)
     };
     for (factor, word) in [(-1.0, "inside out"), (0.0, "encloses the volume")] {
         let failure =

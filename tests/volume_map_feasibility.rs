@@ -1,19 +1,15 @@
 //! Obstacles to maps without inversions: found where they are planted, named, and split away where a split helps.
 
+use crate::volume_map::{settings, target_of};
 use serde_json::json;
 use vargeo::mesh::TetrahedralMesh;
 use vargeo::mesh::connectivity::{self, NONE};
-use vargeo::mesh::generate;
-use vargeo::mesh::target::{self, Target};
+use vargeo::mesh::generate::{self, lattice::kuhn};
+use vargeo::mesh::target;
 use vargeo::method::volume_map;
 use vargeo::method::volume_map::feasibility::{self, planar_faces};
 use vargeo::method::volume_map::problem::Problem;
-use vargeo::method::volume_map::settings::Settings;
 use vargeo::optimize::Silent;
-
-fn settings(value: serde_json::Value) -> Settings {
-    Settings::resolve(&value).expect("valid settings")
-}
 
 /// A generated mesh and positions of its boundary vertices on a shape, zero inside.
 fn on_shape(generator: &str, parameters: serde_json::Value, shape: &str) -> (TetrahedralMesh, Vec<[f64; 3]>) {
@@ -32,14 +28,6 @@ fn on_shape(generator: &str, parameters: serde_json::Value, shape: &str) -> (Tet
         positions[vertex as usize] = position;
     }
     (generated.mesh, positions)
-}
-
-fn target_of(mesh: &TetrahedralMesh, positions: &[[f64; 3]]) -> Target {
-    let boundary = connectivity::boundary(&mesh.cells, mesh.points.len());
-    Target {
-        positions: boundary.vertices.iter().map(|&v| positions[v as usize]).collect(),
-        interior: None,
-    }
 }
 
 #[test]
@@ -117,26 +105,8 @@ fn a_triangle_turned_over_is_named_and_bounds_the_inversions() {
 
 #[test]
 fn tetrahedra_that_the_boundary_inverts_are_split() {
-    // A Kuhn cube: all eight vertices on the boundary, its diagonal 0-7 inside, no tetrahedron with a free vertex.
-    let corner = |i: u32| [f64::from(i & 1), f64::from(i >> 1 & 1), f64::from(i >> 2 & 1)];
-    let kuhn = [
-        [0, 1, 3, 7],
-        [0, 1, 7, 5],
-        [0, 5, 7, 4],
-        [0, 3, 2, 7],
-        [0, 2, 6, 7],
-        [0, 6, 4, 7],
-    ];
-    let mesh = TetrahedralMesh {
-        points: (0..8).map(corner).collect(),
-        cells: kuhn
-            .into_iter()
-            .map(|[a, b, c, d]: [u32; 4]| {
-                let positive = vargeo::mesh::determinant([a, b, c, d].map(corner)) > 0.0;
-                if positive { [a, b, c, d] } else { [a, c, b, d] }
-            })
-            .collect(),
-    };
+    // All eight vertices on the boundary, the diagonal 0-7 inside, no tetrahedron with a free vertex.
+    let mesh = kuhn(1);
     let boundary = connectivity::boundary(&mesh.cells, 8);
     assert!(
         !feasibility::check(&mesh, &boundary, &mesh.points).forbid(),

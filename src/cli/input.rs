@@ -2,6 +2,7 @@
 
 use super::Exit;
 use crate::experiment::diagnostic::{Diagnostic, Severity, render};
+use crate::experiment::document;
 use crate::experiment::file::Experiment;
 use crate::experiment::plan::{Lookup, Plan};
 use crate::method;
@@ -103,9 +104,10 @@ fn find(folder: &Path, files: &mut Vec<PathBuf>) -> std::io::Result<()> {
         if entry.file_type()?.is_dir() {
             find(&path, files)?;
         } else if path.extension().is_some_and(|ending| ending == "toml") {
-            // A file that is no TOML is reported when it is read as an experiment.
-            let text = std::fs::read_to_string(&path).unwrap_or_default();
-            if toml::from_str::<toml::Table>(&text).map_or(true, |table| table.contains_key("method")) {
+            // A file that cannot be read as TOML is reported when it is read as an experiment.
+            let table = (document::read(&path).ok())
+                .and_then(|bytes| toml::from_str::<toml::Table>(std::str::from_utf8(&bytes).ok()?).ok());
+            if table.is_none_or(|table| table.contains_key("method")) {
                 files.push(path);
             }
         }

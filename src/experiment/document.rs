@@ -2,6 +2,7 @@
 
 use super::diagnostic::{Diagnostic, Source};
 use std::ops::Range;
+use std::path::Path;
 use std::sync::Arc;
 use toml::de::{DeArray, DeTable, DeValue};
 
@@ -58,6 +59,22 @@ impl Content {
             Content::Table(_) => "a table",
         }
     }
+}
+
+/// Most bytes of a file that a person writes.
+const MOST_BYTES: u64 = 16 << 20;
+
+/// The bytes of a TOML file.
+///
+/// # Errors
+/// When it cannot be read, or is far larger than any experiment.
+pub fn read(path: &Path) -> std::io::Result<Vec<u8>> {
+    let bytes = std::fs::metadata(path)?.len();
+    if bytes > MOST_BYTES {
+        let text = format!("it has {bytes} bytes; at most {MOST_BYTES} are read of a TOML file");
+        return Err(std::io::Error::other(text));
+    }
+    std::fs::read(path)
 }
 
 /// Reads TOML; every syntax error that can be told apart from its consequences is reported.

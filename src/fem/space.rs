@@ -107,6 +107,11 @@ fn face_nodes(order: usize, corners: usize) -> usize {
 }
 
 impl Space {
+    /// The highest of its cells' orders.
+    pub fn highest_order(&self) -> usize {
+        self.orders.iter().copied().max().unwrap_or(1)
+    }
+
     /// The space over a mesh with an order a cell.
     ///
     /// # Errors

@@ -15,4 +15,5 @@ pub mod processor;
 pub mod vector3;
 pub mod svd3;
 pub mod eigen3;
+mod fresh_memory;
 pub mod sparse;

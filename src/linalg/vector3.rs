@@ -56,6 +56,19 @@ pub fn cofactor<S: Scalar>(m: &Columns<S>) -> Columns<S> {
     [cross(m[1], m[2]), cross(m[2], m[0]), cross(m[0], m[1])]
 }
 
+/// The entries 00 01 02 11 12 22 of a symmetric matrix.
+#[inline(always)]
+pub fn upper_entries<S>(entry: impl Fn(usize, usize) -> S) -> [S; 6] {
+    [
+        entry(0, 0),
+        entry(0, 1),
+        entry(0, 2),
+        entry(1, 1),
+        entry(1, 2),
+        entry(2, 2),
+    ]
+}
+
 /// `sum_ij a_ij b_ij`.
 #[inline(always)]
 pub fn inner<S: Scalar>(a: &Columns<S>, b: &Columns<S>) -> S {

@@ -72,7 +72,11 @@ pub(crate) const LONG_STEP: f64 = 0.5;
 pub trait Objective {
     /// Number of unknowns.
     fn dimension(&self) -> usize;
-    fn value(&mut self, x: &[f64]) -> f64;
+    /// The value alone. Worth writing where a method asks for values without gradients, as Newton's line search does and
+    /// L-BFGS never.
+    fn value(&mut self, x: &[f64]) -> f64 {
+        self.gradient(x, &mut vec![0.0; x.len()])
+    }
     /// Writes the gradient at `x` and returns the value. Where the value is not finite the gradient is not used.
     fn gradient(&mut self, x: &[f64], gradient: &mut [f64]) -> f64;
     /// The largest `t` for which `x + s direction` is certain to stay in the domain for all `s < t`; infinite when

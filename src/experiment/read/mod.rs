@@ -51,7 +51,7 @@ impl Experiment {
     /// Reads an experiment file. On success the warnings are in [`Origin::warnings`]; otherwise all diagnostics return.
     pub fn read(path: &Path, methods: &[&'static dyn Method]) -> Result<Experiment, Vec<Diagnostic>> {
         let name = path.display().to_string();
-        let bytes = std::fs::read(path).map_err(|error| {
+        let bytes = document::read(path).map_err(|error| {
             vec![
                 Diagnostic::error(format!("cannot read {name}: {error}"))
                     .help("name an experiment file; `vargeo new` writes one to start from"),

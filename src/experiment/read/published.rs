@@ -32,15 +32,16 @@ pub fn read(
         Content::Table(table) => read_table(checker, table, node.span.clone(), context, columns, true),
         Content::Text(path) => {
             let path = context.folder.join(path);
-            let text = match std::fs::read_to_string(&path) {
-                Ok(text) => text,
-                Err(error) => {
-                    checker
-                        .error(node.span.clone(), format!("cannot read {}: {error}", path.display()))
-                        .help = Some("the path is relative to the experiment file".to_owned());
-                    return None;
-                }
-            };
+            let text =
+                match document::read(&path).and_then(|bytes| String::from_utf8(bytes).map_err(std::io::Error::other)) {
+                    Ok(text) => text,
+                    Err(error) => {
+                        checker
+                            .error(node.span.clone(), format!("cannot read {}: {error}", path.display()))
+                            .help = Some("the path is relative to the experiment file".to_owned());
+                        return None;
+                    }
+                };
             let source = Arc::new(Source {
                 name: path.display().to_string(),
                 text,

@@ -30,7 +30,7 @@ use super::basis::Basis;
 use super::batches::in_frame;
 use super::space::{Kind, Space};
 use crate::fem::functions::{line_table, tetrahedron_table, triangle_table};
-use crate::linalg::vector3::{Columns, add, apply, cofactor, dot, subtract, times};
+use crate::linalg::vector3::{Columns, add, apply, cofactor, dot, subtract, times, upper_entries};
 use crate::mesh::mixed::Shape;
 use bernstein::{Conversion, line_conversion, tetrahedron_conversion, triangle_conversion};
 use interval::Interval;
@@ -298,14 +298,7 @@ fn prove(control: &[Columns<f64>], mean: &Columns<f64>, error: f64) -> Option<f6
                 })
             });
             let entry = |i: usize, j: usize| 0.5 * (m[i][j] + m[j][i]) - if i == j { delta } else { 0.0 };
-            let (a, b, c, d, e, f) = (
-                entry(0, 0),
-                entry(0, 1),
-                entry(0, 2),
-                entry(1, 1),
-                entry(1, 2),
-                entry(2, 2),
-            );
+            let [a, b, c, d, e, f] = upper_entries(entry);
             let minor = a * d - b * b;
             let whole = f * minor - a * e * e + 2.0 * b * c * e - c * c * d;
             if !(a > 1e-14 && minor > 1e-14 && whole > 1e-14) {

@@ -7,6 +7,7 @@
 use super::dense::{factorize_columns, times_signs, update_rectangle, update_triangle};
 use super::elimination::{Elimination, strip_start, strip_width};
 use super::pattern::BlockPattern;
+use crate::linalg::fresh_memory::zeros;
 use faer::linalg::matmul::matmul;
 use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
 use faer::{Accum, Mat, MatMut, MatRef, Par};
@@ -95,9 +96,8 @@ impl<const B: usize> BlockCholesky<B> {
         self.factorizations += 1;
         let elimination = &self.pattern.elimination;
         if self.factor.is_empty() {
-            // Fresh zeros come from the system without a pass over them, which a resize would make.
-            self.factor = vec![0.0; elimination.factor_scalars()];
-            self.arena = vec![0.0; elimination.working_scalars()];
+            self.factor = zeros(elimination.factor_scalars());
+            self.arena = zeros(elimination.working_scalars());
         }
         let numeric = Numeric {
             pattern: &self.pattern,

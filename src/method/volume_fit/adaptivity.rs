@@ -7,9 +7,9 @@
 //! predicts how much the energy would fall. A function shared by several elements counts in equal parts. The energy is
 //! a mean over the surface, so that this indicator leaves small places with a large distance alone.
 
+use super::distances::fine_intervals;
 use super::fit::Fit;
 use super::settings::{Adaptive, Indicator};
-use super::surface_energy::SurfaceEnergy;
 use super::{invalid, quality};
 use crate::fem::boundary::Boundary;
 use crate::fem::space::Space;
@@ -32,16 +32,14 @@ pub(super) fn raised(
     }
 }
 
-/// Intervals along an edge, at least, when distances are measured.
-const FINE: usize = 12;
 /// Raising is in vain when the largest distance is not below this share of what it was so many steps before.
 const WORTHWHILE: f64 = 0.97;
 const PATIENCE: usize = 3;
 
 fn raised_by_distance(fit: &Fit<'_>, adaptive: &Adaptive, history: &mut Vec<f64>) -> Option<Vec<usize>> {
     let orders = &fit.space.orders;
-    let highest = orders.iter().copied().max().unwrap_or(1);
-    let boundary = Boundary::new(&fit.volume, &fit.topology, &fit.space, FINE.max(2 * highest));
+    let intervals = fine_intervals(fit.space.highest_order());
+    let boundary = Boundary::new(&fit.volume, &fit.topology, &fit.space, intervals);
     let mut samples = Vec::new();
     boundary.positions(&fit.x, &mut samples);
     let owners: Vec<usize> = fit
@@ -117,7 +115,6 @@ fn raised_by_energy(fit: &Fit<'_>, adaptive: &Adaptive) -> Result<Option<Vec<usi
     for node in fit.space.counterparts(&space).into_iter().flatten() {
         old[node as usize] = true;
     }
-    let highest = up.iter().copied().max().unwrap_or(1);
     let volume = fit.volume_energy(&space)?;
     let mut gradient = vec![0.0; x.len()];
     if !volume.add_gradient(&x, fit.lambda, &mut gradient).value.is_finite() {
@@ -131,19 +128,10 @@ fn raised_by_energy(fit: &Fit<'_>, adaptive: &Adaptive) -> Result<Option<Vec<usi
         smooth(fit, &mut result);
         return Ok((result != *orders).then_some(result));
     }
-    let boundary = Boundary::new(&fit.volume, &fit.topology, &space, fit.intervals(highest));
+    let boundary = fit.boundary(&space);
     let mut samples = Vec::new();
     boundary.positions(&x, &mut samples);
-    if settings.terms.to_target || settings.terms.from_target {
-        let mut surface = SurfaceEnergy::new(
-            &samples,
-            &boundary.triangles,
-            &fit.target,
-            settings.terms,
-            settings.anisotropy,
-            fit.scale,
-        )
-        .map_err(invalid)?;
+    if let Some(mut surface) = fit.surface_energy(&boundary, &samples)? {
         let mut forces = vec![[0.0; 3]; samples.len()];
         surface.gradient(&samples, &mut forces);
         boundary.add_gradient(&forces, &mut gradient);
@@ -185,7 +173,7 @@ fn raised_by_energy(fit: &Fit<'_>, adaptive: &Adaptive) -> Result<Option<Vec<usi
         })
         .collect();
     let total: f64 = indicators.iter().map(|entry| entry.0).sum();
-    let energy = fit.last.surface + fit.lambda * fit.last.volume;
+    let energy = fit.last.total(fit.lambda);
     if !(total > 1e-6 * energy) {
         return Ok(None);
     }

@@ -14,6 +14,11 @@ use std::collections::BTreeMap;
 /// Intervals along an edge when distances are measured.
 const FINE: usize = 12;
 
+/// Intervals along an edge to measure distances of a boundary with this order.
+pub(super) fn fine_intervals(order: usize) -> usize {
+    FINE.max(2 * order)
+}
+
 /// Distances and uniformity of the boundary, unless `stop` says to give up.
 pub fn measure_boundary(
     volume: &MixedMesh,
@@ -24,8 +29,7 @@ pub fn measure_boundary(
     metrics: &mut BTreeMap<String, f64>,
     stop: &dyn Fn() -> bool,
 ) -> Result<(), Failure> {
-    let highest = space.orders.iter().copied().max().unwrap_or(1);
-    let boundary = Boundary::new(volume, topology, space, FINE.max(2 * highest));
+    let boundary = Boundary::new(volume, topology, space, fine_intervals(space.highest_order()));
     let mut samples = Vec::new();
     boundary.positions(x, &mut samples);
     let fitted = TriangleMesh {

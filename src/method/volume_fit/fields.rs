@@ -170,7 +170,8 @@ pub static FIELDS: &[Field] = &[
         kind: Kind::OneOf(&[
             Kind::Choice(&[(
                 "auto",
-                "Gauss and Lobatto: order + 2 and order + 3 for polynomials, 2 order else, 3 at least; trapezoid: 2 order - 1",
+                "Gauss and Lobatto: order + 2 and order + 3 for polynomials, 2 order else, 3 at least, with adaptive orders 10; \
+                 trapezoid: 2 order - 1",
             )]),
             Kind::Integer { min: 2, max: 40 },
         ]),

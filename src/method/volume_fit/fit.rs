@@ -3,13 +3,14 @@
 use super::objective::Parts;
 use super::settings::{Settings, Stage, Terms};
 use super::shell::{self, Shell};
-use super::surface_energy::Scale;
+use super::surface_energy::{Scale, SurfaceEnergy};
 use super::target::{Closure, Target};
 use super::template::{Template, transform};
 use super::validity::Certificates;
 use super::{COUNTERS, adaptivity, invalid, orientation, quality, subdivision, untangle};
 use crate::energy::mapping::Density;
 use crate::fem::batches::{Batches, reference_volume, references_of_volume};
+use crate::fem::boundary::Boundary;
 use crate::fem::quadrature::{CellQuadrature, Rule};
 use crate::fem::space::{Kind, Space};
 use crate::fem::volume_energy::VolumeEnergy;
@@ -228,6 +229,37 @@ impl<'a> Fit<'a> {
         Rule::Lobatto.cell(kind.shape, points.max(usual) + self.extra_points)
     }
 
+    /// The boundary of the map in this space, sampled as densely as its orders ask for.
+    pub(super) fn boundary(&self, space: &Space) -> Boundary {
+        Boundary::new(
+            &self.volume,
+            &self.topology,
+            space,
+            self.intervals(space.highest_order()),
+        )
+    }
+
+    /// The surface energy about these samples of the boundary; none for shells and where no distance is wanted.
+    pub(super) fn surface_energy(
+        &self,
+        boundary: &Boundary,
+        samples: &[[f64; 3]],
+    ) -> Result<Option<SurfaceEnergy>, Failure> {
+        if self.surface_factor() == 0.0 {
+            return Ok(None);
+        }
+        let settings = self.settings;
+        let energy = SurfaceEnergy::new(
+            samples,
+            &boundary.triangles,
+            &self.target,
+            settings.terms,
+            settings.anisotropy,
+            self.scale,
+        );
+        Ok(Some(energy.map_err(invalid)?))
+    }
+
     /// Intervals between samples along an edge of the boundary.
     pub(super) fn intervals(&self, order: usize) -> usize {
         let induced = if order == 1 { 1 } else { 2 * order - 2 };
@@ -324,7 +356,7 @@ impl<'a> Fit<'a> {
                 }
             }
             if !interrupted(stop) {
-                let order = self.space.orders.iter().copied().max().unwrap_or(1);
+                let order = self.space.highest_order();
                 (stop, reason) = self.stage(&Stage { order, ..last }, observer)?;
             }
         }

@@ -17,6 +17,13 @@ pub struct Parts {
     pub least_determinant: f64,
 }
 
+impl Parts {
+    /// The energy with this weight of the volume's.
+    pub fn total(&self, lambda: f64) -> f64 {
+        self.surface + lambda * self.volume
+    }
+}
+
 /// The energy of one stage.
 pub struct FitObjective<'a> {
     pub volume: &'a VolumeEnergy,
@@ -30,24 +37,39 @@ pub struct FitObjective<'a> {
     pub floor: Rc<Cell<f64>>,
     pub samples: Vec<[f64; 3]>,
     pub forces: Vec<[f64; 3]>,
-    pub room: Vec<f64>,
     /// What the unknowns stand for; the nodes themselves when absent.
     pub chart: Option<&'a Chart>,
     /// Nodes of the unknowns, and the gradient by them.
     pub nodes: [Vec<f64>; 2],
 }
 
+impl<'a> FitObjective<'a> {
+    /// Over the nodes, without a preconditioner or a floor.
+    pub fn new(
+        volume: &'a VolumeEnergy,
+        boundary: &'a Boundary,
+        surface: Option<&'a mut SurfaceEnergy>,
+        lambda: f64,
+    ) -> FitObjective<'a> {
+        FitObjective {
+            volume,
+            boundary,
+            surface,
+            lambda,
+            preconditioner: None,
+            latest: Rc::default(),
+            floor: Rc::new(Cell::new(f64::NEG_INFINITY)),
+            samples: Vec::new(),
+            forces: Vec::new(),
+            chart: None,
+            nodes: Default::default(),
+        }
+    }
+}
+
 impl Objective for FitObjective<'_> {
     fn dimension(&self) -> usize {
         self.chart.map_or(3 * self.volume.nodes(), Chart::unknowns)
-    }
-
-    fn value(&mut self, x: &[f64]) -> f64 {
-        let mut gradient = std::mem::take(&mut self.room);
-        gradient.resize(x.len(), 0.0);
-        let value = self.gradient(x, &mut gradient);
-        self.room = gradient;
-        value
     }
 
     fn gradient(&mut self, x: &[f64], gradient: &mut [f64]) -> f64 {
@@ -99,6 +121,6 @@ impl FitObjective<'_> {
             self.boundary.add_gradient(&self.forces, gradient);
         }
         self.latest.set(parts);
-        parts.surface + self.lambda * parts.volume
+        parts.total(self.lambda)
     }
 }

@@ -68,10 +68,10 @@ impl Fit<'_> {
         set("least_determinant_ever", if ever.is_finite() { ever } else { f64::NAN });
         set("energy_surface", self.last.surface);
         set("energy_volume", self.last.volume);
-        set("energy", self.last.surface + self.lambda * self.last.volume);
+        set("energy", self.last.total(self.lambda));
         set("increases", self.increases as f64);
         set("nodes", self.space.nodes as f64);
-        let highest = self.space.orders.iter().copied().max().unwrap_or(1);
+        let highest = self.space.highest_order();
         let most = self.settings.adaptive.map_or(highest, |adaptive| adaptive.most);
         let full =
             Space::new(&self.volume, &self.topology, self.settings.basis, &vec![most; cells]).map_err(invalid)?;

@@ -23,7 +23,7 @@ pub fn picture(
     fields: &[(&str, Vec<f64>)],
 ) -> Result<Vec<u8>, Failure> {
     let cells = volume.cells();
-    let highest = space.orders.iter().copied().max().unwrap_or(1);
+    let highest = space.highest_order();
     let mut cuts = if highest == 1 { 1 } else { (2 * highest).clamp(4, 8) };
     while cuts > 1 && cells * cuts * cuts * cuts > MOST_CELLS {
         cuts -= 1;

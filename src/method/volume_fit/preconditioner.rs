@@ -15,7 +15,7 @@ use crate::fem::quadrature::Rule;
 use crate::fem::space::{Kind, Slot, Space};
 use crate::linalg::processor::Processor;
 use crate::linalg::sparse::{BlockCholesky, BlockPattern};
-use crate::linalg::vector3::{Columns, add as plus, cofactor, dot, times};
+use crate::linalg::vector3::{Columns, add as plus, cofactor, dot, times, upper_entries};
 use crate::mesh::mixed::{MixedMesh, Topology};
 use crate::mesh::{area_vector, length};
 use std::collections::BTreeMap;
@@ -59,7 +59,7 @@ impl Preconditioner {
     /// When the system cannot be factorized.
     pub fn new(model: &Model<'_>) -> Result<Preconditioner, String> {
         let space = model.space;
-        let highest = space.orders.iter().copied().max().unwrap_or(1);
+        let highest = space.highest_order();
         let capped = |cap: usize| -> Result<Space, String> {
             let orders: Vec<usize> = space.orders.iter().map(|&order| order.min(cap)).collect();
             Space::new(model.mesh, model.topology, space.basis, &orders)
@@ -409,18 +409,10 @@ pub(super) fn sample_blocks(model: &Model<'_>) -> Vec<[f64; 6]> {
         .map(|(sum, area)| {
             let n = times(*sum, 1.0 / length(*sum).max(f64::MIN_POSITIVE));
             let weight = 4.0 * model.surface * area;
-            let entry = |i: usize, j: usize| {
+            upper_entries(|i, j| {
                 let along = if i == j { tangential } else { 0.0 };
                 weight * ((1.0 - tangential) * n[i] * n[j] + along)
-            };
-            [
-                entry(0, 0),
-                entry(0, 1),
-                entry(0, 2),
-                entry(1, 1),
-                entry(1, 2),
-                entry(2, 2),
-            ]
+            })
         })
         .collect()
 }

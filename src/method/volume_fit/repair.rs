@@ -8,9 +8,7 @@
 use super::fit::Fit;
 use super::objective::Parts;
 use super::preconditioner::{self, Model};
-use super::surface_energy::SurfaceEnergy;
-use super::untangle::TANGLED;
-use super::untangle::{Quiet, Round, Turned, turn};
+use super::untangle::{Quiet, Round, TANGLED, Turned, turn};
 use super::validity::Certificates;
 use super::{invalid, untangle};
 use crate::energy::mapping::Density;
@@ -36,6 +34,9 @@ const SOFTNESS: f64 = 2.0;
 
 /// Quadrature points a direction that every repair has more than the one before.
 const EXTRA: usize = 3;
+
+/// A map with fewer failing elements is not taken when its energy is this much higher.
+const DEARER: f64 = 2.0;
 
 /// Elements are mended in their places when at most one in so many fails.
 const FEW: usize = 5;
@@ -135,20 +136,11 @@ struct PatchObjective<'a> {
     /// One over the diagonal of a model of the Hessian; 0 for nodes that stay.
     inverse: &'a [f64],
     samples: Vec<[f64; 3]>,
-    room: Vec<f64>,
 }
 
 impl Objective for PatchObjective<'_> {
     fn dimension(&self) -> usize {
         3 * self.inverse.len()
-    }
-
-    fn value(&mut self, x: &[f64]) -> f64 {
-        let mut gradient = std::mem::take(&mut self.room);
-        gradient.resize(x.len(), 0.0);
-        let value = self.gradient(x, &mut gradient);
-        self.room = gradient;
-        value
     }
 
     fn gradient(&mut self, x: &[f64], gradient: &mut [f64]) -> f64 {
@@ -224,9 +216,12 @@ impl Fit<'_> {
         if self.settings.repairs == 0 {
             return Ok(None);
         }
+        let energy = self.last.total(self.lambda);
         observer.phase("certify");
         let mut certificates = Certificates::of_all(&self.space, &self.references, &self.x, observer);
         let before = certificates.failing().len();
+        // The best so far; the rounds go on from where they are.
+        let mut best = (certificates.clone(), self.x.clone());
         for round in 0..self.settings.repairs {
             let failing = certificates.failing();
             if failing.is_empty() || observer.stop().is_some() {
@@ -234,30 +229,27 @@ impl Fit<'_> {
             }
             observer.phase("repair");
             self.extra_points += EXTRA;
-            if round == 0 && self.few(&failing) {
-                let moved = repair(self, &failing, observer)?;
-                observer.phase("certify");
-                certificates.renew(&moved, &self.space, &self.references, &self.x, observer);
-                continue;
-            }
-            let kept = self.x.clone();
-            let last = self.settings.stages[self.settings.stages.len() - 1];
-            match self.stage(&last, observer) {
-                Err(failure) if failure.kind == TANGLED => {
-                    self.x = kept;
-                    self.notices.push(format!("a repair was given up: {}", failure.reason));
-                    break;
-                }
-                other => other?,
+            let in_place = round == 0 && self.few(&failing);
+            let moved = if in_place {
+                repair(self, &failing, observer)?
+            } else {
+                self.repair_all(observer)?
             };
-            if !self.volume_energy(&self.space)?.value(&self.x).value.is_finite() {
-                // Stopped while determinants were being turned.
-                self.x = kept;
+            let dear = !(self.energy()?.total(self.lambda) < DEARER * energy);
+            if dear || observer.stop().is_some() {
+                (certificates, self.x) = best.clone();
+                if in_place {
+                    continue;
+                }
                 break;
             }
             observer.phase("certify");
-            certificates = Certificates::of_all(&self.space, &self.references, &self.x, observer);
+            certificates.renew(&moved, &self.space, &self.references, &self.x, observer);
+            if observer.stop().is_none() && certificates.failing().len() < best.0.failing().len() {
+                best = (certificates.clone(), self.x.clone());
+            }
         }
+        (certificates, self.x) = best;
         if before > 0 {
             self.notices.push(format!(
                 "{before} elements were invalid between quadrature points after the last stage; after repairs with up to \
@@ -265,39 +257,43 @@ impl Fit<'_> {
                 self.extra_points,
                 certificates.failing().len()
             ));
-            self.measure_energy()?;
+            self.extra_points = 0;
+            self.last = self.energy()?;
         }
         self.certificates = Some(certificates);
         Ok(observer.stop())
     }
 
+    /// Goes on with the last stage. Gives all elements: none where they got tangled.
+    fn repair_all(&mut self, observer: &mut dyn Observer) -> Result<Vec<usize>, Failure> {
+        let last = self.settings.stages[self.settings.stages.len() - 1];
+        match self.stage(&last, observer) {
+            Ok(_) => Ok((0..self.volume.cells()).collect()),
+            Err(failure) if failure.kind == TANGLED => {
+                self.notices.push(format!("a repair was given up: {}", failure.reason));
+                Ok(Vec::new())
+            }
+            Err(failure) => Err(failure),
+        }
+    }
+
     /// The parts of the energy at the present map, with the points of the stages.
-    fn measure_energy(&mut self) -> Result<(), Failure> {
-        self.extra_points = 0;
+    fn energy(&mut self) -> Result<Parts, Failure> {
+        let extra = std::mem::take(&mut self.extra_points);
         let volume = self.volume_energy(&self.space)?.value(&self.x);
-        let order = self.space.orders.iter().copied().max().unwrap_or(1);
-        let boundary = Boundary::new(&self.volume, &self.topology, &self.space, self.intervals(order));
+        self.extra_points = extra;
+        let boundary = self.boundary(&self.space);
         let mut samples = Vec::new();
         boundary.positions(&self.x, &mut samples);
         let mut surface = 0.0;
-        if self.surface_factor() > 0.0 {
-            let mut energy = SurfaceEnergy::new(
-                &samples,
-                &boundary.triangles,
-                &self.target,
-                self.settings.terms,
-                self.settings.anisotropy,
-                self.scale,
-            )
-            .map_err(invalid)?;
+        if let Some(mut energy) = self.surface_energy(&boundary, &samples)? {
             surface = energy.gradient(&samples, &mut vec![[0.0; 3]; samples.len()]);
         }
-        self.last = Parts {
+        Ok(Parts {
             surface,
             volume: volume.value,
             least_determinant: volume.least_determinant,
-        };
-        Ok(())
+        })
     }
 }
 
@@ -310,8 +306,8 @@ fn repair(fit: &mut Fit<'_>, seeds: &[usize], observer: &mut dyn Observer) -> Re
     let own: f64 = (patch.mesh.iter().zip(&patch.references))
         .map(|((shape, _), reference)| reference_volume(shape, reference))
         .sum();
-    let order = patch.space.orders.iter().copied().max().unwrap_or(1);
-    let boundary = Boundary::new(&patch.mesh, &patch.topology, &patch.space, fit.intervals(order));
+    let intervals = fit.intervals(patch.space.highest_order());
+    let boundary = Boundary::new(&patch.mesh, &patch.topology, &patch.space, intervals);
     let mut anchors = Vec::new();
     boundary.positions(&patch.x, &mut anchors);
     let model = Model {
@@ -342,7 +338,6 @@ fn repair(fit: &mut Fit<'_>, seeds: &[usize], observer: &mut dyn Observer) -> Re
             blocks: &blocks,
             inverse: &inverse,
             samples: Vec::new(),
-            room: Vec::new(),
         };
         let lbfgs = Lbfgs {
             stopping: Stopping {

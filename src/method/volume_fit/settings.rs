@@ -262,14 +262,19 @@ impl Settings {
 
     /// Points a direction of a rule for cells of an order where the file leaves them open.
     pub fn usual_points(&self, rule: Rule, order: usize) -> usize {
+        let fewest = if self.adaptive.is_some() { ADAPTIVE_POINTS } else { 3 };
         match rule {
-            Rule::Gauss if self.basis.is_polynomial() => (order + 2).max(3),
-            Rule::Lobatto if self.basis.is_polynomial() => order + 3,
-            Rule::Gauss | Rule::Lobatto => (2 * order).max(3),
+            Rule::Gauss if self.basis.is_polynomial() => (order + 2).max(fewest),
+            Rule::Lobatto if self.basis.is_polynomial() => (order + 3).max(fewest),
+            Rule::Gauss | Rule::Lobatto => (2 * order).max(fewest),
             Rule::Trapezoid => (2 * order - 1).max(2),
         }
     }
 }
+
+/// Points a direction of every element at least where single orders are raised: with a rule that grows with the order
+/// each raised element shows inversions that the barrier did not see before.
+const ADAPTIVE_POINTS: usize = 10;
 
 /// The far phase at order 1, then the close phase through the orders.
 fn default_schedule(

@@ -6,8 +6,6 @@ use super::invalid;
 use super::objective::{FitObjective, Parts};
 use super::preconditioner::{Model, Preconditioner};
 use super::settings::Stage;
-use super::surface_energy::SurfaceEnergy;
-use crate::fem::boundary::Boundary;
 use crate::method::Failure;
 use crate::optimize::lbfgs::Lbfgs;
 use crate::optimize::{Iterate, Observer, StopReason, Stopping};
@@ -103,34 +101,23 @@ impl Fit<'_> {
         mut chart: Option<(&Chart, &mut Vec<f64>)>,
         observer: &mut dyn Observer,
     ) -> Result<(StopReason, String), Failure> {
-        observer.phase(&format!("stage {}", self.stages));
         let settings = self.settings;
         self.lambda = stage.lambda;
-        let order = self.space.orders.iter().copied().max().unwrap_or(1);
+        let order = self.space.highest_order();
         let volume = self.volume_energy(&self.space)?;
+        // Unknowns of a chart have to be turned by what made them.
         if settings.untangle
+            && chart.is_none()
             && let Some(stop) = self.mend(&volume, observer)?
         {
             return Ok((stop, "stopped from outside while elements were untangled".to_string()));
         }
-        let boundary = Boundary::new(&self.volume, &self.topology, &self.space, self.intervals(order));
+        observer.phase(&format!("stage {}", self.stages));
+        let boundary = self.boundary(&self.space);
         let mut samples = Vec::new();
         boundary.positions(&self.x, &mut samples);
-        let fitted = self.shell.is_none() && (settings.terms.to_target || settings.terms.from_target);
-        let mut surface = if fitted {
-            let energy = SurfaceEnergy::new(
-                &samples,
-                &boundary.triangles,
-                &self.target,
-                settings.terms,
-                settings.anisotropy,
-                self.scale,
-            );
-            Some(energy.map_err(invalid)?)
-        } else {
-            None
-        };
-        let latest = Rc::new(Cell::new(Parts::default()));
+        let mut surface = self.surface_energy(&boundary, &samples)?;
+        let latest: Rc<Cell<Parts>> = Rc::default();
         let floor = Rc::new(Cell::new(f64::NEG_INFINITY));
         let mut done = 0;
         let mut previous = f64::INFINITY;
@@ -167,18 +154,11 @@ impl Fit<'_> {
                 left
             };
             let mut objective = FitObjective {
-                volume: &volume,
-                boundary: &boundary,
-                surface: surface.as_mut(),
-                lambda: stage.lambda,
                 preconditioner,
                 latest: latest.clone(),
                 floor: floor.clone(),
-                samples: Vec::new(),
-                forces: Vec::new(),
-                room: Vec::new(),
                 chart: chart.as_ref().map(|chart| chart.0),
-                nodes: Default::default(),
+                ..FitObjective::new(&volume, &boundary, surface.as_mut(), stage.lambda)
             };
             let lbfgs = Lbfgs {
                 stopping: Stopping {

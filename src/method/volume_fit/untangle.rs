@@ -4,22 +4,19 @@
 //! Success is judged at the quadrature points. Not guaranteed: success.
 
 use super::fit::Fit;
-use super::invalid;
-use super::objective::{FitObjective, Parts};
-use super::surface_energy::SurfaceEnergy;
+use super::objective::FitObjective;
 use crate::energy::mapping::Density;
 use crate::energy::untangling::Untangling;
-use crate::fem::boundary::Boundary;
 use crate::fem::volume_energy::Evaluation;
 use crate::method::Failure;
 use crate::optimize::lbfgs::Lbfgs;
 use crate::optimize::{Iterate, Observer, StopReason, Stopping};
-use std::cell::Cell;
-use std::rc::Rc;
 
 /// Values of the regularization at most, and iterations with each.
 const ROUNDS: usize = 60;
 const ITERATIONS: u64 = 60;
+/// Weight of the regularized energy beside the surface's.
+const LAMBDA: f64 = 0.05;
 /// Least share by which the regularized determinant falls from round to round.
 const DECREASE: f64 = 0.1;
 
@@ -95,43 +92,17 @@ pub(super) fn turn(
 /// `tangled` when elements stay inverted.
 pub(super) fn untangle(fit: &mut Fit<'_>, observer: &mut dyn Observer) -> Result<Option<StopReason>, Failure> {
     observer.phase("untangle");
-    let order = fit.space.orders.iter().copied().max().unwrap_or(1);
-    let boundary = Boundary::new(&fit.volume, &fit.topology, &fit.space, fit.intervals(order));
+    let boundary = fit.boundary(&fit.space);
     let mut samples = Vec::new();
     boundary.positions(&fit.x, &mut samples);
-    let terms = fit.settings.terms;
-    let mut surface = None;
-    if terms.to_target || terms.from_target {
-        let energy = SurfaceEnergy::new(
-            &samples,
-            &boundary.triangles,
-            &fit.target,
-            terms,
-            fit.settings.anisotropy,
-            fit.scale,
-        );
-        surface = Some(energy.map_err(invalid)?);
-    }
+    let mut surface = fit.surface_energy(&boundary, &samples)?;
     let least = fit.volume_energy(&fit.space)?.value(&fit.x).least_determinant;
     let turned = turn(
         1.0,
         least,
         |regularization, observer| {
             let volume = fit.volume_energy_of(&fit.space, Density::of(regularization))?;
-            let mut objective = FitObjective {
-                volume: &volume,
-                boundary: &boundary,
-                surface: surface.as_mut(),
-                lambda: 0.05,
-                preconditioner: None,
-                latest: Rc::new(Cell::new(Parts::default())),
-                floor: Rc::new(Cell::new(f64::NEG_INFINITY)),
-                samples: Vec::new(),
-                forces: Vec::new(),
-                room: Vec::new(),
-                chart: None,
-                nodes: Default::default(),
-            };
+            let mut objective = FitObjective::new(&volume, &boundary, surface.as_mut(), LAMBDA);
             let lbfgs = Lbfgs {
                 stopping: Stopping {
                     gradient_norm: 1e-10,

@@ -93,12 +93,14 @@ pub fn results(experiment: &Experiment, rows: &[Row]) -> Result<Results, ReportE
         let scale = scales[&name];
         let _ = write!(
             text,
-            "<div class=\"scale\"><span>{}{}</span><span>{}</span><span class=\"ramp\" style=\"background:linear-gradient(90deg,{})\"></span><span>{}</span>{}</div>",
+            "<div class=\"scale\"><span>{}{}</span><span>{}{}</span><span class=\"ramp\" style=\"background:linear-gradient(90deg,{})\"></span><span>{}{}</span>{}</div>",
             escape(&name.replace('_', " ")),
             if scale.logarithmic { ", logarithmic" } else { "" },
+            if scale.least < scale.low { "≤ " } else { "" },
             round(scale.low, 3).unicode(),
             MAP.map(|[red, green, blue]| format!("#{red:02x}{green:02x}{blue:02x}"))
                 .join(","),
+            if scale.most > scale.high { "≥ " } else { "" },
             round(scale.high, 3).unicode(),
             if survey.inverted {
                 "<span class=\"striped\"></span><span>inverted cells</span>"
@@ -126,6 +128,8 @@ pub fn results(experiment: &Experiment, rows: &[Row]) -> Result<Results, ReportE
 const UNIT: Scale = Scale {
     low: 0.0,
     high: 1.0,
+    least: 0.0,
+    most: 1.0,
     logarithmic: false,
 };
 
@@ -384,6 +388,8 @@ impl Embedded {
                     "label": name.replace('_', " "),
                     "low": scale.low,
                     "high": scale.high,
+                    "least": scale.least,
+                    "most": scale.most,
                     "log": scale.logarithmic,
                 });
                 (name, value)

@@ -209,6 +209,8 @@ o=vec4(mix(c*s,vec3(.05),k*wire),1.);}`));
     if (fresh) { $("low").value = digits(s.low); $("high").value = digits(s.high); }
     const low = +$("low").value, high = +$("high").value;
     const ticks = [0, .25, .5, .75, 1].map(x => digits(s.log ? low * (high / low) ** x : low + (high - low) * x));
+    if (s.least < Math.min(low, high)) ticks[low < high ? 0 : 4] = "≤ " + ticks[low < high ? 0 : 4];
+    if (s.most > Math.max(low, high)) ticks[low < high ? 4 : 0] = "≥ " + ticks[low < high ? 4 : 0];
     $("ticks").replaceChildren(...ticks.map(t => Object.assign(document.createElement("span"), { textContent: t })));
     $("unit").textContent = s.label + (s.log ? ", logarithmic" : "");
   };

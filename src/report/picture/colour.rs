@@ -19,11 +19,14 @@ pub const INVERTED: [u8; 3] = [214, 20, 40];
 /// Cells whose value is undefined.
 pub const UNDEFINED: [u8; 3] = [150, 150, 150];
 
-/// Values at both ends of the map.
+/// Values at both ends of the map. Those beyond take the colours of the ends.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scale {
     pub low: f64,
     pub high: f64,
+    /// The extremes of all values.
+    pub least: f64,
+    pub most: f64,
     pub logarithmic: bool,
 }
 
@@ -37,6 +40,8 @@ impl Scale {
             return Scale {
                 low: 0.0,
                 high: 1.0,
+                least: 0.0,
+                most: 1.0,
                 logarithmic: false,
             };
         };
@@ -51,6 +56,8 @@ impl Scale {
         Scale {
             low,
             high,
+            least: *first,
+            most: *last,
             logarithmic: *first > 0.0 && high > 3.0 * low,
         }
     }

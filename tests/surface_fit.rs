@@ -28,14 +28,14 @@ fn gradient_is_that_of_the_value() {
     for (compatibility, unfolding) in [(0.0, 0.0), (0.05, 0.0), (0.0, 30.0)] {
         for s in [1.0, 5.0] {
             // Far enough from regular to fold where unfolding is asked for.
-            let noise = if unfolding > 0.0 { 0.6 } else { 0.05 };
+            let (noise, levels) = if unfolding > 0.0 { (1.0, 0) } else { (0.05, 1) };
             let points = regular.as_flattened().iter().enumerate();
             let points: Vec<f64> = points
                 .map(|(index, x)| x + noise * ((index * index) as f64 * 12.9898).sin())
                 .collect();
             control.points = points.as_chunks().0.to_vec();
             let settings = Settings::resolve(&json!({
-                "subdivisions": 1, "anisotropy": s, "regularization": 0.01, "compatibility": compatibility
+                "subdivisions": levels, "anisotropy": s, "regularization": 0.01, "compatibility": compatibility
             }))
             .unwrap();
             let (fitted, map) = fitted_mesh(&control, &[], &settings);

@@ -1,6 +1,6 @@
 //! Surfaces of triangles and quadrilaterals together, with no demand on how they hang together.
 
-use super::{TriangleMesh, cross, dot, format::Content, length, subtract};
+use super::{TriangleMesh, area_vector, cross, dot, format::Content, length, subtract};
 
 /// Points, triangles and quadrilaterals; indices refer to `points`. Faces count triangles first, then quadrilaterals.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -55,6 +55,29 @@ impl Surface {
         };
         surface.drop_unused();
         Ok(surface)
+    }
+
+    /// Triangles with vertices of the same coordinates made one, and without flat ones. All points stay.
+    pub fn welded(mesh: &TriangleMesh) -> Surface {
+        let key = |vertex: u32| mesh.points[vertex as usize].map(|x| (x + 0.0).to_bits());
+        let mut order: Vec<u32> = (0..mesh.points.len() as u32).collect();
+        order.sort_unstable_by_key(|&vertex| (key(vertex), vertex));
+        let mut first = vec![0u32; mesh.points.len()];
+        for same in order.chunk_by(|&a, &b| key(a) == key(b)) {
+            for &vertex in same {
+                first[vertex as usize] = same[0];
+            }
+        }
+        Surface {
+            points: mesh.points.clone(),
+            triangles: mesh
+                .cells
+                .iter()
+                .filter(|&&cell| length(area_vector(mesh.corners(cell))) > 0.0)
+                .map(|cell| cell.map(|vertex| first[vertex as usize]))
+                .collect(),
+            quads: Vec::new(),
+        }
     }
 
     /// Leaves out points that no face uses; returns how many.

@@ -79,7 +79,8 @@ const OWN: &[Metric] = &[
         "",
         Some(0.0),
         Better::Lower,
-        "What the last stage minimizes, the target scaled to diagonal 1: both terms and the regularizers with their factors.",
+        "What the last stage minimizes, the target scaled to diagonal 1: both terms, the regularizers and \
+         what unfolds, with their factors.",
     ),
     metric(
         "target_to_fit",

@@ -33,7 +33,8 @@ use crate::optimize::{Counters, Objective, Observer, StopReason, Stopping};
 use objective::FitObjective;
 use problem::Problem;
 use serde_json::Value;
-use settings::Settings;
+use settings::{Settings, Stage};
+use std::collections::VecDeque;
 use trace::{Recorder, Trace};
 
 /// The method `surface-fit`.
@@ -45,7 +46,7 @@ impl Method for SurfaceFit {
     }
 
     fn version(&self) -> u32 {
-        4
+        5
     }
 
     fn summary(&self) -> &'static str {
@@ -120,6 +121,11 @@ pub fn fitted_mesh(control: &Surface, creases: &[[u32; 2]], settings: &Settings)
     (fitted, map)
 }
 
+/// Most stages that unfold,
+const UNFOLDINGS: i32 = 2;
+/// and the factor by which each counts folded corners more than the one before.
+const MORE: f64 = 10.0;
+
 /// Most faces of a fitted mesh.
 const MOST_FACES: f64 = 2e7;
 
@@ -152,7 +158,17 @@ pub fn run(problem: &Problem, settings: &Settings, observer: &mut dyn Observer) 
     check_size(&problem.template, settings)?;
     let mut control = problem.template.clone();
     let mut creases = control.creases(settings.crease_angle);
-    let stages = settings.stages();
+    let stages = if settings.approach.is_near(problem.near) {
+        settings.stages_from_near()
+    } else {
+        settings.stages()
+    };
+    if stages != settings.stages() {
+        notices.push(format!(
+            "the template starts near the target: all stages have the last one's regularization, {}, at most",
+            stages[stages.len() - 1].regularization
+        ));
+    }
     let mut trace = Trace::default();
     let mut counters = Counters::default();
     let mut minimizations = 0;
@@ -167,7 +183,8 @@ pub fn run(problem: &Problem, settings: &Settings, observer: &mut dyn Observer) 
     let mut samples = take_samples(fitted.points.len(), observer)?;
     let mut parts = objective::Parts::default();
     let mut reached = stages[0];
-    let total = (stages.len() + settings.refinements) as u64;
+    let mut unfoldings = 0;
+    let mut total = (stages.len() + settings.refinements) as u64;
     'rounds: for round in 0..=settings.refinements {
         if round > 0 {
             observer.phase("refine");
@@ -192,7 +209,8 @@ pub fn run(problem: &Problem, settings: &Settings, observer: &mut dyn Observer) 
             stages[first],
         )?;
         let mut x = control.points.as_flattened().to_vec();
-        for &stage in &stages[first..] {
+        let mut left: VecDeque<Stage> = stages[first..].iter().copied().collect();
+        while let Some(stage) = left.pop_front() {
             reached = stage;
             objective.set_stage(stage);
             let lbfgs = Lbfgs {
@@ -218,6 +236,22 @@ pub fn run(problem: &Problem, settings: &Settings, observer: &mut dyn Observer) 
             counters += solution.counters;
             minimizations += 1;
             (stop, reason) = (solution.stop, solution.reason);
+            let has_ended = matches!(
+                stop,
+                StopReason::TimeLimit | StopReason::Cancelled | StopReason::NotFinite
+            );
+            let is_last = !has_ended && left.is_empty() && round == settings.refinements;
+            if is_last && settings.unfolding > 0.0 && unfoldings < UNFOLDINGS {
+                map.apply(x.as_chunks().0, &mut fitted.points);
+                if fitted.scaled_jacobians().iter().any(|&jacobian| !(jacobian > 0.0)) {
+                    left.push_back(Stage {
+                        unfolding: settings.unfolding * MORE.powi(unfoldings),
+                        ..stage
+                    });
+                    unfoldings += 1;
+                    total += 1;
+                }
+            }
             if total > 1 {
                 reason = format!("stage {minimizations} of {total}: {reason}");
             }
@@ -227,10 +261,7 @@ pub fn run(problem: &Problem, settings: &Settings, observer: &mut dyn Observer) 
                     minimizations, settings.iteration_limit
                 ));
             }
-            if matches!(
-                stop,
-                StopReason::TimeLimit | StopReason::Cancelled | StopReason::NotFinite
-            ) {
+            if has_ended {
                 break;
             }
         }

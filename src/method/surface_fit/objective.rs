@@ -27,6 +27,8 @@ pub struct Parts {
     pub regularizer: f64,
     /// `|P L X|^2`, without its factor.
     pub unevenness: f64,
+    /// What the corners of faces lack in area to be turned like the fit, squared, without its factor.
+    pub folding: f64,
 }
 
 /// What the second term runs over.
@@ -65,6 +67,10 @@ pub struct FitObjective<'a> {
     turns: Vec<[f64; 3]>,
     /// Of the fit at the start of the stage; once it is known.
     tangents: Option<Vec<Tangent>>,
+    /// The corners of the faces: a point, the next and the one before; in stages that unfold.
+    corners: Vec<[u32; 3]>,
+    /// The unit normals of the fit at the start of a stage that unfolds, and the area that a corner should span.
+    upright: Option<(Vec<[f64; 3]>, f64)>,
     boundary: Vec<bool>,
     control: Vec<[f64; 3]>,
     preconditioner: Option<Preconditioner>,
@@ -79,6 +85,9 @@ pub struct FitObjective<'a> {
 
 /// The projection along the fit at one of its points, by the unit normal there: none without a normal.
 pub type Tangent = Option<[f64; 3]>;
+
+/// Share of the mean area at a corner that every corner should span at least.
+const SPAN: f64 = 0.05;
 
 /// Evaluations after which the preconditioner is made anew.
 const AGE: usize = 5;
@@ -177,6 +186,10 @@ impl<'a> FitObjective<'a> {
             areas: vec![[0.0; 3]; count],
             turns: vec![[0.0; 3]; count],
             tangents: None,
+            corners: (0..fitted.faces())
+                .flat_map(|face| corners(fitted.face(face)))
+                .collect(),
+            upright: None,
             boundary,
             control: vec![[0.0; 3]; map.columns()],
         })
@@ -195,6 +208,7 @@ impl<'a> FitObjective<'a> {
     pub fn set_stage(&mut self, stage: Stage) {
         self.stage = stage;
         self.tangents = None;
+        self.upright = None;
         self.age = AGE;
     }
 
@@ -356,10 +370,56 @@ impl<'a> FitObjective<'a> {
             apply_laplacian(&self.edges, &self.degrees, &self.laplacian, &mut self.term);
             add_to(&mut self.gradient, &self.term, 2.0);
         }
+        if self.stage.unfolding > 0.0 {
+            parts.folding = self.unfold(with_gradient);
+        }
         self.latest.set(parts);
-        let value =
-            parts.to_target + parts.from_target + regularization * parts.regularizer + evenness * parts.unevenness;
+        let value = parts.to_target
+            + parts.from_target
+            + regularization * parts.regularizer
+            + evenness * parts.unevenness
+            + self.stage.unfolding * parts.folding;
         if value.is_finite() { value } else { f64::INFINITY }
+    }
+
+    /// The sum over the corners of `max(0, goal - n . (a x b))^2` with the edges `a`, `b` at the corner and the normal `n`
+    /// of the fit there at the start of the stage. Adds the gradient with its factor.
+    fn unfold(&mut self, with_gradient: bool) -> f64 {
+        if self.upright.is_none() {
+            self.find_normals();
+            let spans = self.corners.iter().map(|&corner| {
+                let [point, next, last] = corner.map(|vertex| self.points[vertex as usize]);
+                length(cross(subtract(next, point), subtract(last, point)))
+            });
+            let goal = SPAN * spans.sum::<f64>() / self.corners.len().max(1) as f64;
+            self.upright = Some((self.normals.clone(), goal));
+        }
+        let Some((normals, goal)) = &self.upright else {
+            return 0.0;
+        };
+        let mut sum = 0.0;
+        for &corner in &self.corners {
+            let [point, next, last] = corner.map(|vertex| self.points[vertex as usize]);
+            let (ahead, back) = (subtract(next, point), subtract(last, point));
+            let normal = normals[corner[0] as usize];
+            let lack = goal - dot(normal, cross(ahead, back));
+            // A point without a normal has nothing to be turned like.
+            if !(lack > 0.0) || normal == [0.0; 3] {
+                continue;
+            }
+            sum += lack * lack;
+            if with_gradient {
+                let factor = -2.0 * self.stage.unfolding * lack;
+                // d n . (a x b) = (b x n) . da + (n x a) . db
+                let (by_next, by_last) = (cross(back, normal), cross(normal, ahead));
+                for axis in 0..3 {
+                    self.gradient[corner[1] as usize][axis] += factor * by_next[axis];
+                    self.gradient[corner[2] as usize][axis] += factor * by_last[axis];
+                    self.gradient[corner[0] as usize][axis] -= factor * (by_next[axis] + by_last[axis]);
+                }
+            }
+        }
+        sum
     }
 
     /// Unit normals of the fitted points: the directions of the sums of the area vectors around them.
@@ -404,6 +464,18 @@ impl<'a> FitObjective<'a> {
             }
         }
     }
+}
+
+/// The corners of a face: each with the next one and the one before.
+fn corners(face: &[u32]) -> impl Iterator<Item = [u32; 3]> {
+    let count = face.len();
+    (0..count).map(move |place| {
+        [
+            face[place],
+            face[(place + 1) % count],
+            face[(place + count - 1) % count],
+        ]
+    })
 }
 
 fn add_to(sum: &mut [[f64; 3]], term: &[[f64; 3]], factor: f64) {

@@ -9,7 +9,7 @@ use crate::geometry::point_tree::PointTree;
 use crate::geometry::squared_distance::{Options, SquaredDistance, Wanted};
 use crate::mesh::format::{Cells, vtu};
 use crate::mesh::surface::Surface;
-use crate::mesh::{self, TriangleMesh, area_vector, length, subtract};
+use crate::mesh::{self, TriangleMesh, length, subtract};
 use crate::method::Failure;
 use crate::metric::distance::{self, Distance, Hausdorff};
 use std::collections::BTreeMap;
@@ -103,7 +103,8 @@ pub fn measure(
         parts.from_target
             + parts.to_target
             + stage.regularization * parts.regularizer
-            + stage.evenness * parts.unevenness,
+            + stage.evenness * parts.unevenness
+            + stage.unfolding * parts.folding,
     );
     let area = triangulated.area();
     set(
@@ -139,7 +140,7 @@ pub fn measure(
     let mut notices = Vec::new();
     if folded > 0 {
         notices.push(format!(
-            "{folded} of {} faces are folded (scaled Jacobian 0 or less); a larger `evenness` or `regularization` unfolds \
+            "{folded} of {} faces are folded (scaled Jacobian 0 or less); a larger `unfolding` or `evenness` unfolds \
              them at some cost of distance",
             jacobians.len()
         ));
@@ -147,7 +148,12 @@ pub fn measure(
     if closed && !no_surface && target_euler != template_euler {
         notices.push(format!(
             "the closed target has the Euler characteristic {target_euler}, the template {template_euler}: no template of \
-             this connectivity can match it everywhere"
+             this connectivity can match it everywhere{}",
+            if problem.near {
+                "; larger `quads` of the voxels resolve more of its holes"
+            } else {
+                ""
+            }
         ));
     }
     if hausdorff.max() > POOR * hausdorff.diagonal {
@@ -216,7 +222,7 @@ fn isotropic(surface: &TriangleMesh, samples: &Samples) -> Result<f64, Failure> 
 fn crease_distances(target: &TriangleMesh, fit: &TriangleMesh, angle: f64) -> (f64, f64) {
     const PARTS: usize = 4;
     // Soups have no connectivity: vertices in one place count as one.
-    let welded = welded(target);
+    let welded = Surface::welded(target);
     let open: Vec<[u32; 2]> = welded.creases(angle);
     let edges = welded.edges();
     // Boundaries are edges of the data, not of the shape.
@@ -243,29 +249,6 @@ fn crease_distances(target: &TriangleMesh, fit: &TriangleMesh, angle: f64) -> (f
     let total: f64 = weights.iter().sum();
     let mean = distances.iter().zip(&weights).map(|(d, w)| d * w).sum::<f64>() / total;
     (distances.into_iter().fold(0.0, f64::max), mean)
-}
-
-/// The surface with vertices of the same coordinates made one, and without flat triangles.
-fn welded(mesh: &TriangleMesh) -> Surface {
-    let key = |vertex: u32| mesh.points[vertex as usize].map(|x| (x + 0.0).to_bits());
-    let mut order: Vec<u32> = (0..mesh.points.len() as u32).collect();
-    order.sort_unstable_by_key(|&vertex| (key(vertex), vertex));
-    let mut first = vec![0u32; mesh.points.len()];
-    for same in order.chunk_by(|&a, &b| key(a) == key(b)) {
-        for &vertex in same {
-            first[vertex as usize] = same[0];
-        }
-    }
-    Surface {
-        points: mesh.points.clone(),
-        triangles: mesh
-            .cells
-            .iter()
-            .filter(|&&cell| length(area_vector(mesh.corners(cell))) > 0.0)
-            .map(|cell| cell.map(|vertex| first[vertex as usize]))
-            .collect(),
-        quads: Vec::new(),
-    }
 }
 
 /// Vertices less edges plus faces over the vertices in use, and whether every edge has two faces.

@@ -22,6 +22,8 @@ pub struct Problem {
     pub cloud: Option<Vec<[f64; 3]>>,
     /// In the solver's units.
     pub template: Surface,
+    /// The template was made within a cube of the target.
+    pub near: bool,
     /// Centre and diagonal of the target's box in the units of its file.
     pub centre: [f64; 3],
     pub diagonal: f64,
@@ -113,8 +115,10 @@ impl Problem {
         let Some([low, high]) = mesh::bounding_box(&target.points) else {
             return Err(invalid("target: there are no points".to_string()));
         };
+        let mut near = false;
         let template = match part("template")? {
             Part::Generated { generator, parameters } if generator == VOXELS => {
+                near = true;
                 let quads = parameters.get("quads").and_then(|quads| quads.as_u64()).unwrap_or(384);
                 voxels::template(&target, quads as usize).map_err(|message| invalid(format!("template: {message}")))?
             }
@@ -134,6 +138,7 @@ impl Problem {
             }
         };
         let mut problem = Problem::of_scaled(target, template, units, notices)?;
+        problem.near = near;
         if only_points {
             problem.use_points_alone();
         }
@@ -190,6 +195,7 @@ impl Problem {
             cloud,
             target,
             template,
+            near: false,
             centre,
             diagonal,
             notices,

@@ -60,12 +60,34 @@ pub static FIELDS: &[Field] = &[
               before. Preset best: [0.02, 0.002, 0.002, 0.0002], paper: 0.0002.",
     },
     Field {
+        name: "approach",
+        kind: Kind::Choice(&[
+            ("auto", "near for a template of voxels, far for any other"),
+            (
+                "near",
+                "no stage with more regularization than the last: the template lies within a face or two of its target, and \
+                 needs no drawing near, which would close its holes",
+            ),
+            ("far", "the stages as they stand"),
+        ]),
+        default: Default::Absent,
+        doc: "How far from the target the template is taken to start. Auto, but far where `regularization` is a list.",
+    },
+    Field {
         name: "evenness",
         kind: Kind::OneOf(&[NUMBERS, Kind::List(&NUMBERS)]),
         default: Default::Absent,
         doc: "Factor mu of |P L X|^2 with the projection P along the fit, whose normals are those at the start of the stage: \
               spreads vertices evenly and keeps faces from folding without drawing the fit off the target. A number, or a \
               list with one entry a stage. Preset best: [0, 0, 0.005], paper: 0.",
+    },
+    Field {
+        name: "unfolding",
+        kind: NUMBERS,
+        default: Default::Absent,
+        doc: "Factor of a term on the corners of faces that are folded or nearly so, in stages of their own after the last: one \
+              where faces are folded then, and another with ten times the factor where some still are. 0 for none. Preset \
+              best: 10000, paper: 0.",
     },
     Field {
         name: "gradient",
@@ -218,6 +240,25 @@ impl Terms {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
+pub enum Approach {
+    Auto,
+    Near,
+    Far,
+}
+
+impl Approach {
+    /// Whether a template starts near, given whether it was made to.
+    pub fn is_near(self, made_near: bool) -> bool {
+        match self {
+            Approach::Auto => made_near,
+            Approach::Near => true,
+            Approach::Far => false,
+        }
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Gradient {
     Complete,
     Paper,
@@ -245,7 +286,9 @@ pub struct Settings {
     /// One entry a stage, as are `regularization`, `evenness` and `change_tolerance`.
     pub anisotropy: Vec<f64>,
     pub regularization: Vec<f64>,
+    pub approach: Approach,
     pub evenness: Vec<f64>,
+    pub unfolding: f64,
     pub gradient: Gradient,
     pub compatibility: f64,
     pub subdivisions: usize,
@@ -270,6 +313,8 @@ pub struct Stage {
     pub anisotropy: f64,
     pub regularization: f64,
     pub evenness: f64,
+    /// Factor of the term on folded corners: 0 but in the stages that come after the schedule.
+    pub unfolding: f64,
     pub change_tolerance: f64,
 }
 
@@ -278,6 +323,9 @@ const ANISOTROPY: [f64; 4] = [1.0, 1.0, 10.0, 50.0];
 const REGULARIZATION: [f64; 4] = [2e-2, 2e-3, 2e-3, 2e-4];
 /// The plain distance hardly folds; the stretched one slides vertices along the target to gain a little distance.
 const EVENNESS: [f64; 3] = [0.0, 0.0, 5e-3];
+
+/// Corners that span next to nothing weigh next to nothing by area squared, so that the factor has to be large.
+const UNFOLDING: f64 = 1e4;
 
 /// The settings that may have one entry a stage.
 const SCHEDULES: [&str; 4] = ["anisotropy", "regularization", "evenness", "change_tolerance"];
@@ -305,6 +353,12 @@ impl Settings {
         let paper = table.remove("preset").is_some_and(|preset| preset == "paper");
         // A number alone is where the schedule leads, unless the other one is a list with stages of its own.
         let listed = |table: &Map<String, Value>, name: &str| table.get(name).is_some_and(Value::is_array);
+        let approach = if listed(&table, "regularization") {
+            "far"
+        } else {
+            "auto"
+        };
+        table.entry("approach").or_insert(Value::from(approach));
         if !paper && !listed(&table, "anisotropy") && !listed(&table, "regularization") {
             for (name, schedule) in [("anisotropy", ANISOTROPY), ("regularization", REGULARIZATION)] {
                 if let Some(last) = table.get(name).and_then(Value::as_f64) {
@@ -330,6 +384,7 @@ impl Settings {
             Value::from(vec![1e-3, 3e-4, 1e-3, 3e-4]),
             Value::from(vec![1e-4]),
         );
+        preset("unfolding", Value::from(UNFOLDING), Value::from(0.0));
         preset("limit", Value::from(true), Value::from(false));
         preset("preconditioner", Value::from("hessian"), Value::from("none"));
         for name in SCHEDULES {
@@ -371,9 +426,20 @@ impl Settings {
                 anisotropy: entry(&self.anisotropy, stage),
                 regularization: entry(&self.regularization, stage),
                 evenness: entry(&self.evenness, stage),
+                unfolding: 0.0,
                 change_tolerance: tolerance(stage),
             })
             .collect()
+    }
+
+    /// The minimizations from a template that starts near its target: none has more regularization than the last.
+    pub fn stages_from_near(&self) -> Vec<Stage> {
+        let mut stages = self.stages();
+        let last = stages.last().map_or(0.0, |stage| stage.regularization);
+        for stage in &mut stages {
+            stage.regularization = stage.regularization.min(last);
+        }
+        stages
     }
 
     /// The settings as a table without those that cannot change the result.

@@ -12,7 +12,7 @@ pub const COLUMNS: &[(&str, &str)] = &[
     ("stage", "number of the stage, from 0; refinements go on counting"),
     (
         "energy",
-        "what is minimized: both terms and the regularizers with their factors",
+        "what is minimized: both terms, the regularizers and what unfolds, with their factors",
     ),
     ("target_to_fit", "the term from the target to the fit's vertices"),
     ("fit_to_target", "the term from the fit to the target's samples"),

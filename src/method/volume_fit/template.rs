@@ -52,7 +52,7 @@ pub fn read(part: &Part, target: Option<&Target>, notices: &mut Vec<String>) -> 
                             "voxels need a target surface; give one, or generate a grid".to_string(),
                         ));
                     };
-                    voxels::voxels(&target.surface, count("along", 8)).map_err(invalid)?
+                    voxels::matching(&target.surface, count("along", 8)).map_err(invalid)?.0
                 }
                 "shell" => {
                     let Some(target) = target else {

@@ -6,6 +6,7 @@ use super::shell::{self, Shell};
 use super::surface_energy::{Scale, SurfaceEnergy};
 use super::target::{Closure, Target};
 use super::template::{Template, transform};
+use super::untangle::Softness;
 use super::validity::Certificates;
 use super::{COUNTERS, adaptivity, invalid, orientation, quality, subdivision, untangle};
 use crate::energy::mapping::Density;
@@ -301,7 +302,7 @@ impl<'a> Fit<'a> {
         let mut reason = String::new();
         // Nothing but the layers holds a shell's surface in its place.
         if !evaluation.value.is_finite() && self.settings.untangle && self.shell.is_none() {
-            if let Some(interrupted) = untangle::untangle(self, observer)? {
+            if let Some(interrupted) = untangle::untangle(self, Softness::Full, observer)? {
                 return self.finish(
                     interrupted,
                     "stopped from outside while the template was untangled".to_string(),

@@ -8,7 +8,7 @@
 use super::fit::Fit;
 use super::objective::Parts;
 use super::preconditioner::{self, Model};
-use super::untangle::{Quiet, Round, TANGLED, Turned, turn};
+use super::untangle::{Quiet, Round, Softness, TANGLED, Turned, turn};
 use super::validity::Certificates;
 use super::{invalid, untangle};
 use crate::energy::mapping::Density;
@@ -28,10 +28,6 @@ const SPACING: u64 = 150;
 
 /// Share of the energy below which its change ends a minimization.
 const CHANGE: f64 = 1e-6;
-
-/// The regularization at the start, in multiples of the least determinant, and at least.
-const SOFTNESS: f64 = 2.0;
-const SOFTEST: f64 = 1e-6;
 
 /// Quadrature points a direction that every repair has more than the one before.
 const EXTRA: usize = 3;
@@ -204,7 +200,7 @@ impl Fit<'_> {
                 return Ok(None);
             }
         }
-        untangle::untangle(self, observer)
+        untangle::untangle(self, Softness::Slight, observer)
     }
 
     /// Whether so few elements fail that the rest may stay where it is.
@@ -368,9 +364,8 @@ fn repair(fit: &mut Fit<'_>, seeds: &[usize], observer: &mut dyn Observer) -> Re
         counted[1] += solution.counters.evaluations;
     };
     let least = barrier.value(&x).least_determinant;
-    let softness = (SOFTNESS * least.abs()).clamp(SOFTEST, 1.0);
     let turned = turn(
-        softness,
+        Softness::Slight.of(least),
         least,
         |regularization, observer| {
             let volume = patch.volume_energy(fit, Density::of(regularization))?;

@@ -23,6 +23,24 @@ const DECREASE: f64 = 0.1;
 /// The kind of the failure to untangle.
 pub(super) const TANGLED: &str = "tangled";
 
+/// The regularization to start with.
+#[derive(Clone, Copy, PartialEq)]
+pub(super) enum Softness {
+    /// For a template that may lie anyhow.
+    Full,
+    /// For a map that is nearly right: no softer than its least determinant asks for.
+    Slight,
+}
+
+impl Softness {
+    pub(super) fn of(self, least: f64) -> f64 {
+        match self {
+            Softness::Full => 1.0,
+            Softness::Slight => (2.0 * least.abs()).clamp(1e-6, 1.0),
+        }
+    }
+}
+
 /// Passes on the wish to stop, and nothing else.
 pub(super) struct Quiet<'a>(pub(super) &'a mut dyn Observer);
 
@@ -90,7 +108,11 @@ pub(super) fn turn(
 ///
 /// # Errors
 /// `tangled` when elements stay inverted.
-pub(super) fn untangle(fit: &mut Fit<'_>, observer: &mut dyn Observer) -> Result<Option<StopReason>, Failure> {
+pub(super) fn untangle(
+    fit: &mut Fit<'_>,
+    softness: Softness,
+    observer: &mut dyn Observer,
+) -> Result<Option<StopReason>, Failure> {
     observer.phase("untangle");
     let boundary = fit.boundary(&fit.space);
     let mut samples = Vec::new();
@@ -98,7 +120,7 @@ pub(super) fn untangle(fit: &mut Fit<'_>, observer: &mut dyn Observer) -> Result
     let mut surface = fit.surface_energy(&boundary, &samples)?;
     let least = fit.volume_energy(&fit.space)?.value(&fit.x).least_determinant;
     let turned = turn(
-        1.0,
+        softness.of(least),
         least,
         |regularization, observer| {
             let volume = fit.volume_energy_of(&fit.space, Density::of(regularization))?;

@@ -275,8 +275,8 @@ pub static FIELDS: &[Field] = &[
         kind: Kind::Integer { min: 0, max: 10 },
         default: Default::Absent,
         doc: "How often, at most, elements that are invalid between quadrature points at the end are mended, with more points \
-              every time: first, if at most one in five fails, on their own with their neighbours, then by going on with the \
-              whole fit. The map with the fewest failing elements is kept. Preset best: 3, paper: 0.",
+              every time: on their own with their neighbours if at most one in five fails, otherwise, and after that, by \
+              going on with the whole fit. The map with the fewest failing elements is kept. Preset best: 3, paper: 0.",
     },
     Field {
         name: "subdivision_levels",

@@ -1,7 +1,7 @@
 //! Mending single elements: those that are invalid somewhere move, and those around them; all others stay.
 //!
 //! The patch of elements has a volume energy of its own. In place of the surface energy stands its model about the
-//! boundary as it was: a parabola along the normals, and a flat one along the surface (see [`super::preconditioner`]).
+//! boundary as it was: a parabola, as stiff along the surface as along its normals (see [`super::preconditioner`]).
 //! First determinants are turned, then the barrier spaces them out. Not guaranteed: success, and that the mended map is a
 //! minimum of the whole energy; it differs from one in the patch alone.
 
@@ -221,14 +221,15 @@ impl Fit<'_> {
         let before = certificates.failing().len();
         // The best so far; the rounds go on from where they are.
         let mut best = (certificates.clone(), self.x.clone());
-        for round in 0..self.settings.repairs {
+        let mut in_place = false;
+        for _ in 0..self.settings.repairs {
             let failing = certificates.failing();
             if failing.is_empty() || observer.stop().is_some() {
                 break;
             }
             observer.phase("repair");
             self.extra_points += EXTRA;
-            let in_place = round == 0 && self.few(&failing);
+            in_place = !in_place && self.few(&failing);
             let moved = if in_place {
                 repair(self, &failing, observer)?
             } else {
@@ -328,7 +329,8 @@ fn repair(fit: &mut Fit<'_>, seeds: &[usize], observer: &mut dyn Observer) -> Re
         lambda: fit.lambda,
         volume: fit.reference_volume,
         surface: fit.surface_factor(),
-        anisotropy: fit.settings.anisotropy,
+        // Stiff along the surface too: a parabola about a plane does not see where the surface bends away.
+        anisotropy: 1.0,
     };
     let blocks = preconditioner::sample_blocks(&model);
     let diagonal = preconditioner::diagonal(&model).map_err(invalid)?;

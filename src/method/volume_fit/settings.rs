@@ -251,7 +251,7 @@ impl Settings {
                 let words = names.iter().filter_map(Value::as_str).map(str::to_owned);
                 words.collect()
             }),
-            repairs: whole("repairs").unwrap_or(if paper { 0 } else { 3 }),
+            repairs: whole("repairs").unwrap_or(if paper { 0 } else { 6 }),
         })
     }
 

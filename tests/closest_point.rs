@@ -8,6 +8,7 @@ use vargeo::geometry::closest_point::{ClosestPoint, Nearest, foot};
 use vargeo::linalg::processor::Processor;
 use vargeo::mesh::TriangleMesh;
 use vargeo::mesh::generate::shape::generate_shape;
+use vargeo::metric::crease::crease_distance;
 use vargeo::metric::distance::{Hausdorff, Sampling, hausdorff, one_sided};
 
 /// What rounding of coordinates of size 1 to 100 may do to a squared distance.
@@ -182,6 +183,18 @@ fn distances_between_surfaces_with_known_values() {
         "{}",
         found.forward.mean
     );
+
+    // The cube's edges to a cube a step higher: the lower four are a step off, the four upright ones below it leave a step.
+    let step = 0.3;
+    let mut higher = cube.clone();
+    for point in &mut higher.points {
+        point[2] += step;
+    }
+    let crease = crease_distance(&cube, &higher, 30.0).unwrap();
+    let mean = (4.0 * 2.0 * step + 4.0 * step * step / 2.0) / 24.0;
+    assert!((crease.max - step).abs() < 1e-12, "{}", crease.max);
+    assert!((crease.mean / mean - 1.0).abs() < 1e-4, "{} for {mean}", crease.mean);
+    assert!(crease_distance(&CONCENTRIC.0, &cube, 30.0).is_none());
 
     // The distance is the same everywhere but for the facets.
     let found = &CONCENTRIC.2;

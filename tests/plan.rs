@@ -218,6 +218,12 @@ fn held_lines(text: &str) -> impl Iterator<Item = &str> {
         .take_while(|line| *line != "[vary]")
 }
 
+/// Whether a line is the head of a table, not a sentence that begins with a list.
+fn heads(line: &str) -> bool {
+    let key = line.strip_prefix('[').and_then(|rest| rest.strip_suffix(']'));
+    key.is_some_and(|key| key.chars().all(|c| c.is_ascii_alphanumeric() || "._-".contains(c)))
+}
+
 #[test]
 fn the_template_of_every_method_plans() {
     let all: Vec<&'static dyn Method> = methods().iter().chain(METHODS).copied().collect();
@@ -236,7 +242,7 @@ fn the_template_of_every_method_plans() {
         // Every default that stands in a comment may be written out: all settings uncommented plan too.
         let held: String = held_lines(&text).fold(String::new(), |text, line| {
             let body = line.strip_prefix("# ").unwrap_or(line);
-            let code = body.starts_with('[') || body.split_once(" = ").is_some_and(|(key, _)| !key.contains(' '));
+            let code = heads(body) || body.split_once(" = ").is_some_and(|(key, _)| !key.contains(' '));
             if code { text + body + "\n" } else { text }
         });
         let rest: String = text
@@ -255,7 +261,7 @@ fn the_template_of_every_method_plans() {
             if code && !comment.contains("this is an example") && !defaults.contains("[settings.") {
                 defaults = defaults + body + "\n";
             }
-            if body.starts_with('[') {
+            if heads(body) {
                 let whole = body == "[settings]";
                 defaults += if whole { "[settings]\n" } else { "# [settings.\n" };
             }

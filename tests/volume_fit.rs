@@ -80,12 +80,13 @@ fn elements_that_fail_between_quadrature_points_are_mended() {
                 Some(json!({ "shape": "pebble", "triangles": 400 })),
                 json!({
                     "order": 4, "quadrature": "gauss", "quadrature_points": points, "lambda": lambda,
-                    "lambda_far": far, "iteration_limit": 40, "repairs": repairs,
+                    "lambda_far": far, "far_steps": 3, "iteration_limit": 40, "repairs": repairs,
                 }),
             )
             .unwrap()
         };
-        let [broken, mended] = [run(0), run(3)];
+        let [broken, mended] = [run(0), with_threads(1, || run(3))];
+        assert_eq!(metric_bits(&mended), metric_bits(&with_threads(2, || run(3))));
         let [before, after] = [&broken, &mended].map(|outcome| &outcome.metrics);
         assert_eq!(
             before["inverted"] * 5.0 <= before["elements"],

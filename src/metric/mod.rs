@@ -1,5 +1,6 @@
 //! What is measured of a result: each metric has a name, a unit, a floor, a better direction and a definition.
 
+pub mod crease;
 pub mod distance;
 pub mod distortion;
 pub mod scaled_jacobian;

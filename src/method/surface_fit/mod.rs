@@ -46,7 +46,7 @@ impl Method for SurfaceFit {
     }
 
     fn version(&self) -> u32 {
-        5
+        6
     }
 
     fn summary(&self) -> &'static str {

@@ -9,8 +9,9 @@ use crate::geometry::point_tree::PointTree;
 use crate::geometry::squared_distance::{Options, SquaredDistance, Wanted};
 use crate::mesh::format::{Cells, vtu};
 use crate::mesh::surface::Surface;
-use crate::mesh::{self, TriangleMesh, length, subtract};
+use crate::mesh::{self, TriangleMesh};
 use crate::method::Failure;
+use crate::metric::crease::crease_distance;
 use crate::metric::distance::{self, Distance, Hausdorff};
 use std::collections::BTreeMap;
 
@@ -79,9 +80,10 @@ pub fn measure(
         far(target, backward)
     };
     set("missed_area", missed);
-    let (crease, crease_mean) = crease_distances(target, &triangulated, settings.feature_angle);
-    set("crease_distance", hausdorff.percent(crease));
-    set("crease_distance_mean", hausdorff.percent(crease_mean));
+    let crease = crease_distance(target, &triangulated, settings.feature_angle);
+    let crease = crease.map_or([f64::NAN; 2], |crease| [crease.max, crease.mean]);
+    set("crease_distance", hausdorff.percent(crease[0]));
+    set("crease_distance_mean", hausdorff.percent(crease[1]));
 
     let jacobians = fitted.scaled_jacobians();
     set(
@@ -218,39 +220,6 @@ fn isotropic(surface: &TriangleMesh, samples: &Samples) -> Result<f64, Failure> 
     Ok(term.evaluate(&surface.points, &tree, &Options::default(), Wanted::default()))
 }
 
-/// Largest and mean distance of the target's crease lines to the fit; not-a-number without creases.
-fn crease_distances(target: &TriangleMesh, fit: &TriangleMesh, angle: f64) -> (f64, f64) {
-    const PARTS: usize = 4;
-    // Soups have no connectivity: vertices in one place count as one.
-    let welded = Surface::welded(target);
-    let open: Vec<[u32; 2]> = welded.creases(angle);
-    let edges = welded.edges();
-    // Boundaries are edges of the data, not of the shape.
-    let inner = |ends: &[u32; 2]| {
-        edges
-            .binary_search_by_key(ends, |edge| edge.ends)
-            .is_ok_and(|edge| edges[edge].faces.len() == 2)
-    };
-    let creases: Vec<[u32; 2]> = open.into_iter().filter(inner).collect();
-    if creases.is_empty() {
-        return (f64::NAN, f64::NAN);
-    }
-    let mut points = Vec::with_capacity(creases.len() * PARTS);
-    let mut weights = Vec::with_capacity(creases.len() * PARTS);
-    for &ends in &creases {
-        let [a, b] = ends.map(|end| welded.points[end as usize]);
-        for part in 0..PARTS {
-            let t = (part as f64 + 0.5) / PARTS as f64;
-            points.push(std::array::from_fn(|axis| a[axis] + t * (b[axis] - a[axis])));
-            weights.push(length(subtract(b, a)));
-        }
-    }
-    let distances = distance::of_points(&points, &ClosestPoint::new(fit));
-    let total: f64 = weights.iter().sum();
-    let mean = distances.iter().zip(&weights).map(|(d, w)| d * w).sum::<f64>() / total;
-    (distances.into_iter().fold(0.0, f64::max), mean)
-}
-
 /// Vertices less edges plus faces over the vertices in use, and whether every edge has two faces.
 fn euler(surface: &Surface) -> (i64, bool) {
     let edges = surface.edges();
@@ -318,7 +287,7 @@ fn side_by_side(problem: &Problem, fitted: &Surface, jacobians: &[f64], hausdorf
         },
         &[],
         &[
-            ("distance", 1, &distance),
+            ("distance_percent", 1, &distance),
             ("scaled_jacobian", 1, &quality),
             ("target", 1, &part),
         ],

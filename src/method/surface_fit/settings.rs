@@ -49,7 +49,8 @@ pub static FIELDS: &[Field] = &[
         default: Default::Absent,
         doc: "Factor s along the target's normals (section 3.6 of the paper): a list with one entry a stage, the last entry \
               of a shorter list holding on; or a number, which the preset's stages then end with and do not exceed \
-              before. Preset best: [1, 1, 10, 50], paper: 50.",
+              before, or which holds in all stages where `regularization` is a list. Preset best: [1, 1, 10, 50], \
+              paper: 50.",
     },
     Field {
         name: "regularization",
@@ -57,7 +58,8 @@ pub static FIELDS: &[Field] = &[
         default: Default::Absent,
         doc: "Factor lambda of |L X|^2 with the graph Laplacian L of the fitted mesh X, the target scaled to diagonal 1: a \
               list with one entry a stage, or a number, which the preset's stages end with and do not go below \
-              before. Preset best: [0.02, 0.002, 0.002, 0.0002], paper: 0.0002.",
+              before; or holds in all stages where `anisotropy` is a list. Preset best: \
+              [0.02, 0.002, 0.002, 0.0002], paper: 0.0002.",
     },
     Field {
         name: "approach",

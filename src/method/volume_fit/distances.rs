@@ -8,11 +8,14 @@ use crate::geometry::closest_point::ClosestPoint;
 use crate::mesh::mixed::{MixedMesh, Topology};
 use crate::mesh::{self, TriangleMesh};
 use crate::method::Failure;
+use crate::metric::crease::crease_distance;
 use crate::metric::distance;
 use std::collections::BTreeMap;
 
 /// Intervals along an edge when distances are measured.
 const FINE: usize = 12;
+/// Edges of the target with a larger angle between their faces' normals, in degrees, are creases.
+const CREASE_ANGLE: f64 = 40.0;
 
 /// Intervals along an edge to measure distances of a boundary with this order.
 pub(super) fn fine_intervals(order: usize) -> usize {
@@ -57,16 +60,11 @@ pub fn measure_boundary(
         set("hausdorff_from_target", measured.percent(measured.backward.max));
         set("distance_rms", measured.percent(measured.backward.rms));
     }
-    let creases = crease_points(clean);
-    let (mut mean, mut most) = (f64::NAN, f64::NAN);
-    if !creases.is_empty() {
-        let distances = distance::of_points(&creases, &ClosestPoint::new(&fitted));
-        let scale = 100.0 / mesh::diagonal(&clean.points);
-        mean = scale * distances.iter().sum::<f64>() / distances.len() as f64;
-        most = scale * distances.iter().copied().fold(0.0, f64::max);
-    }
-    set("crease_distance", mean);
-    set("crease_distance_max", most);
+    let crease = crease_distance(clean, &fitted, CREASE_ANGLE);
+    let scale = 100.0 / mesh::diagonal(&clean.points);
+    let crease = crease.map_or([f64::NAN; 2], |crease| [scale * crease.mean, scale * crease.max]);
+    set("crease_distance", crease[0]);
+    set("crease_distance_max", crease[1]);
     let mut sum = 0.0;
     for line in &boundary.edges {
         let speeds: Vec<f64> = line
@@ -79,33 +77,4 @@ pub fn measure_boundary(
     }
     set("edge_uniformity", sum / boundary.edges.len() as f64);
     Ok(())
-}
-
-/// Points along the edges of a surface that are bent by more than 40 degrees.
-fn crease_points(surface: &TriangleMesh) -> Vec<[f64; 3]> {
-    let mut sides: BTreeMap<[u32; 2], Vec<[f64; 3]>> = BTreeMap::new();
-    for &cell in &surface.cells {
-        let normal = mesh::area_vector(surface.corners(cell));
-        let size = mesh::length(normal);
-        if !(size > 0.0) {
-            continue;
-        }
-        let normal = normal.map(|coordinate| coordinate / size);
-        for place in 0..3 {
-            let (a, b) = (cell[place], cell[(place + 1) % 3]);
-            sides.entry([a.min(b), a.max(b)]).or_default().push(normal);
-        }
-    }
-    let mut points = Vec::new();
-    for ([a, b], normals) in sides {
-        if let [first, second] = normals[..]
-            && mesh::dot(first, second) < 40.0_f64.to_radians().cos()
-        {
-            let (a, b) = (surface.points[a as usize], surface.points[b as usize]);
-            for share in [0.1, 0.5, 0.9] {
-                points.push(std::array::from_fn(|axis| a[axis] + share * (b[axis] - a[axis])));
-            }
-        }
-    }
-    points
 }

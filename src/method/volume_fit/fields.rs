@@ -63,7 +63,7 @@ pub static FIELDS: &[Field] = &[
         kind: Kind::Choice(&[
             (
                 "best",
-                "integrated Legendre, Lobatto quadrature, preconditioned L-BFGS, a far phase in steps",
+                "integrated Legendre, Lobatto quadrature, preconditioned L-BFGS, a gentle far phase",
             ),
             (
                 "paper",
@@ -94,7 +94,8 @@ pub static FIELDS: &[Field] = &[
         kind: Kind::Number { min: 0.0, max: 1e9 },
         default: Default::Absent,
         doc: "Weight of the volume energy in the far phase, which brings a template that is far away near as a whole, where the \
-              close phase would crush its outer layer; 0 leaves the far phase out. 50 when absent.",
+              close phase would crush its outer layer; 0 leaves the far phase out. Strong ones pull long thin parts \
+              askew and close narrow holes. Preset best: 5, paper: 50.",
     },
     Field {
         name: "lambda",
@@ -106,8 +107,8 @@ pub static FIELDS: &[Field] = &[
     Field {
         name: "far_steps",
         kind: Kind::Integer { min: 1, max: 50 },
-        default: Default::Absent,
-        doc: "Stages of the far phase: 1 keeps lambda_far; more go down to lambda in geometric steps. Preset best: 3, paper: 1.",
+        default: Default::Integer(1),
+        doc: "Stages of the far phase: 1 keeps lambda_far; more go down to lambda in geometric steps.",
     },
     Field {
         name: "schedule",
@@ -272,11 +273,11 @@ pub static FIELDS: &[Field] = &[
     },
     Field {
         name: "repairs",
-        kind: Kind::Integer { min: 0, max: 10 },
+        kind: Kind::Integer { min: 0, max: 50 },
         default: Default::Absent,
         doc: "How often, at most, elements that are invalid between quadrature points at the end are mended, with more points \
               every time: on their own with their neighbours if at most one in five fails, otherwise, and after that, by \
-              going on with the whole fit. The map with the fewest failing elements is kept. Preset best: 6, paper: 0.",
+              going on with the whole fit. The map with the fewest failing elements is kept. Preset best: 10, paper: 0.",
     },
     Field {
         name: "subdivision_levels",

@@ -54,7 +54,7 @@ impl Method for VolumeFit {
     }
 
     fn version(&self) -> u32 {
-        6
+        7
     }
 
     fn summary(&self) -> &'static str {

@@ -133,7 +133,7 @@ impl Settings {
             })
         };
         let far = settings.get("lambda_far").and_then(Value::as_f64);
-        let far = far.unwrap_or(50.0);
+        let far = far.unwrap_or(if paper { 50.0 } else { 5.0 });
         let order = number("order") as usize;
         let limit = number("iteration_limit") as u64;
         let given = |name: &str, best: f64| {
@@ -163,7 +163,7 @@ impl Settings {
                 stages = default_schedule(
                     order,
                     &text("raise"),
-                    (far, whole("far_steps").unwrap_or(if paper { 1 } else { 3 })),
+                    (far, number("far_steps") as usize),
                     number("lambda"),
                     limit,
                     tolerance,
@@ -251,7 +251,7 @@ impl Settings {
                 let words = names.iter().filter_map(Value::as_str).map(str::to_owned);
                 words.collect()
             }),
-            repairs: whole("repairs").unwrap_or(if paper { 0 } else { 6 }),
+            repairs: whole("repairs").unwrap_or(if paper { 0 } else { 10 }),
         })
     }
 

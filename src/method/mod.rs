@@ -60,6 +60,16 @@ pub struct Failure {
     pub reason: String,
 }
 
+impl Failure {
+    /// The model or the settings cannot be computed with.
+    pub fn invalid(reason: impl Into<String>) -> Failure {
+        Failure {
+            kind: "invalid-input".to_string(),
+            reason: reason.into(),
+        }
+    }
+}
+
 /// A family of computations over one kind of model.
 pub trait Method: Sync {
     /// The name in an experiment file: `volume-map`.

@@ -128,16 +128,12 @@ pub fn run(
     notices: Vec<String>,
     observer: &mut dyn Observer,
 ) -> Result<Outcome, Failure> {
-    let invalid = |reason: String| Failure {
-        kind: "invalid-input".to_string(),
-        reason,
-    };
     let mut term = SquaredDistance::new(&surface.points, &surface.cells)
-        .map_err(|error| invalid(format!("surface: {error}; mend the file")))?;
+        .map_err(|error| Failure::invalid(format!("surface: {error}; mend the file")))?;
     observer.phase("scatter");
     let start = scatter(&surface.points, &surface.cells, settings.sites as usize, settings.seed);
     if start.is_empty() {
-        return Err(invalid(
+        return Err(Failure::invalid(
             "the surface has no area, so that sites cannot be spread over it; give a surface with triangles that are not \
              flat"
             .to_string(),

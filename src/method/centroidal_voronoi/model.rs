@@ -35,13 +35,6 @@ pub fn kind() -> &'static ModelKind {
     &KIND
 }
 
-fn invalid(reason: String) -> Failure {
-    Failure {
-        kind: "invalid-input".to_string(),
-        reason,
-    }
-}
-
 /// The surface of a model. Quadrilaterals are cut in two.
 ///
 /// # Errors
@@ -50,15 +43,15 @@ pub fn surface(model: &LoadedModel, notices: &mut Vec<String>) -> Result<Triangl
     let part = model
         .parts
         .get("surface")
-        .ok_or_else(|| invalid("the model has no `surface`; give it a file or a generator".to_string()))?;
+        .ok_or_else(|| Failure::invalid("the model has no `surface`; give it a file or a generator"))?;
     let surface = match part {
         Part::Generated { generator, parameters } => {
             let generated = generate::generate(generator, parameters)
-                .map_err(|reason| invalid(format!("generator \"{generator}\" of the surface: {reason}")))?;
+                .map_err(|reason| Failure::invalid(format!("generator \"{generator}\" of the surface: {reason}")))?;
             boundary(generated.mesh)
         }
         Part::File { name, bytes, .. } => {
-            let content = format::read(name, bytes).map_err(|error| invalid(error.to_string()))?;
+            let content = format::read(name, bytes).map_err(|error| Failure::invalid(error.to_string()))?;
             notices.extend(content.notices.iter().map(|notice| format!("{name}: {notice}")));
             let mut cells = content.triangles;
             for &[a, b, c, d] in &content.quads {
@@ -70,7 +63,7 @@ pub fn surface(model: &LoadedModel, notices: &mut Vec<String>) -> Result<Triangl
                 let cells = content.tetrahedra;
                 boundary(TetrahedralMesh { points, cells })
             } else if cells.is_empty() {
-                return Err(invalid(format!(
+                return Err(Failure::invalid(format!(
                     "{name}: there are no triangles, quadrilaterals or tetrahedra; a tessellation needs a surface"
                 )));
             } else {
@@ -80,7 +73,7 @@ pub fn surface(model: &LoadedModel, notices: &mut Vec<String>) -> Result<Triangl
     };
     let limit = crate::geometry::point_tree::LARGEST;
     if let Some(vertex) = surface.points.iter().position(|x| !x.iter().all(|x| x.abs() < limit)) {
-        return Err(invalid(format!(
+        return Err(Failure::invalid(format!(
             "surface: vertex {vertex} (counted from 0) has a coordinate that is not a number below {limit:e}; mend the file"
         )));
     }

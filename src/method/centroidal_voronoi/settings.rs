@@ -81,9 +81,7 @@ impl Settings {
     /// # Errors
     /// `invalid-input` when a value is missing or of another type.
     pub fn resolve(settings: &Value) -> Result<Settings, Failure> {
-        serde_json::from_value(settings.clone()).map_err(|error| Failure {
-            kind: "invalid-input".to_string(),
-            reason: format!("settings of centroidal-voronoi: {error}"),
-        })
+        serde_json::from_value(settings.clone())
+            .map_err(|error| Failure::invalid(format!("settings of centroidal-voronoi: {error}")))
     }
 }

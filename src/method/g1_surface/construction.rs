@@ -10,7 +10,7 @@ use super::metrics;
 use super::network::Network;
 use super::outcome::{self, Shape};
 use super::patch::{self, Fitted, Patch};
-use super::problem::{self, Problem};
+use super::problem::Problem;
 use super::repair::{Repaired, repair};
 use super::settings::{EdgeNormals, Geometry, Patches, RANK_TOLERANCE, Settings, Tangents};
 use super::{COUNTERS, Failure};
@@ -93,7 +93,7 @@ impl Building {
             &problem.normals,
             problem.creases.as_ref(),
         )
-        .map_err(problem::invalid)?;
+        .map_err(Failure::invalid)?;
         let mut notices = problem.notices.clone();
         notices.extend(found);
         let mut building = Self {
@@ -167,13 +167,13 @@ impl Building {
             Tangents::Natural => return Ok(None),
             Tangents::Balanced => {
                 let found = balance::balance(&mut self.network, settings.tangent_stiffness, None, observer)
-                    .map_err(problem::invalid)?;
+                    .map_err(Failure::invalid)?;
                 (iterations, factorizations, residual) = (found.iterations, found.factorizations, found.residual);
                 self.tangent_change = found.largest_change;
                 slopes = Some(found.slopes);
             }
             Tangents::Enclosing => {
-                let found = enclosure::enclose(&mut self.network, observer).map_err(problem::invalid)?;
+                let found = enclosure::enclose(&mut self.network, observer).map_err(Failure::invalid)?;
                 (iterations, factorizations, residual) = (found.iterations, found.factorizations, found.residual);
                 self.tangent_change = found.largest_change;
                 slopes = None;
@@ -211,7 +211,7 @@ impl Building {
         let mut slopes = match (balanced, settings.edge_normals) {
             (Some(slopes), _) => slopes,
             (None, EdgeNormals::LeastSquares) => {
-                let solved = least_squares::solve(&self.network, settings.rank_tolerance).map_err(problem::invalid)?;
+                let solved = least_squares::solve(&self.network, settings.rank_tolerance).map_err(Failure::invalid)?;
                 rank = solved.rank;
                 if rank.is_none() && settings.rank_tolerance != RANK_TOLERANCE {
                     self.notices.push(format!(
@@ -230,7 +230,7 @@ impl Building {
                 solved.slopes
             }
             (None, exact) => {
-                edge_normals::exact(&self.network, exact == EdgeNormals::Shortest).map_err(problem::invalid)?
+                edge_normals::exact(&self.network, exact == EdgeNormals::Shortest).map_err(Failure::invalid)?
             }
         };
         self.set("normal_rank", rank.map_or(f64::NAN, |rank| rank as f64));

@@ -137,7 +137,7 @@ pub fn run(problem: &Problem, settings: &Settings, observer: &mut dyn Observer) 
     if let Some(kind) = settings.shell() {
         observer.phase("hexahedra");
         let found = hexahedra::build(problem, &built.patches, kind, settings.layers as usize, observer)
-            .map_err(problem::invalid)?;
+            .map_err(Failure::invalid)?;
         found.tell(&mut built.metrics);
         shell = Some(found);
     }
@@ -157,7 +157,7 @@ pub fn run(problem: &Problem, settings: &Settings, observer: &mut dyn Observer) 
             outcome::pieces(settings, built.patches.len()),
             settings.stripes,
         )
-        .map_err(problem::invalid)?;
+        .map_err(Failure::invalid)?;
         found.leave(frame);
         Ok::<_, Failure>(found)
     };
@@ -167,7 +167,7 @@ pub fn run(problem: &Problem, settings: &Settings, observer: &mut dyn Observer) 
         Some(shell) => {
             let pieces = outcome::pieces(settings, shell.cells.len()).min(6);
             let (mesh, connectivity) = problem.whole();
-            hexahedra::tessellate(shell, &mesh.quads, connectivity, pieces).map_err(problem::invalid)?
+            hexahedra::tessellate(shell, &mesh.quads, connectivity, pieces).map_err(Failure::invalid)?
         }
         None => tessellate()?.vtu(),
     };
@@ -181,7 +181,7 @@ pub fn run(problem: &Problem, settings: &Settings, observer: &mut dyn Observer) 
     if settings.exports("obj") {
         files.insert(
             "tessellation.obj".to_string(),
-            tessellate()?.obj().map_err(problem::invalid)?,
+            tessellate()?.obj().map_err(Failure::invalid)?,
         );
     }
     if settings.exports("control-points") {
@@ -208,14 +208,13 @@ fn simulate(
     metrics: &mut outcome::Metrics,
 ) -> Result<(), Failure> {
     let Some(Truth::Analytic(exact)) = &problem.truth else {
-        return Err(problem::invalid(
-            "the test problem needs a surface given by one formula; use a generated mesh without creases, or order = 0"
-                .to_string(),
+        return Err(Failure::invalid(
+            "the test problem needs a surface given by one formula; use a generated mesh without creases, or order = 0",
         ));
     };
     let (quads, connectivity) = (&problem.mesh.quads, &problem.connectivity);
     let solved = laplace_beltrami::solve(patches, quads, connectivity, exact, settings.order as usize)
-        .map_err(problem::invalid)?;
+        .map_err(Failure::invalid)?;
     metrics.insert("l2_error".to_string(), solved.error);
     metrics.insert("gradient_error".to_string(), solved.gradient_error);
     metrics.insert("unknowns".to_string(), solved.unknowns as f64);

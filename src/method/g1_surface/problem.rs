@@ -46,13 +46,6 @@ pub struct Problem {
 /// Degrees between planes from which on an edge that stays smooth is worth a notice.
 const SHARP: f64 = 60.0;
 
-pub(super) fn invalid(reason: String) -> Failure {
-    Failure {
-        kind: "invalid-input".to_string(),
-        reason,
-    }
-}
-
 /// A mesh as the model gives it, and what comes with it.
 struct Given {
     mesh: QuadrilateralMesh,
@@ -99,12 +92,12 @@ impl Problem {
         }
         for problem in quadrilateral::check(&mut mesh) {
             match problem.severity {
-                Severity::Error => return Err(invalid(format!("mesh: {}", problem.message))),
+                Severity::Error => return Err(Failure::invalid(format!("mesh: {}", problem.message))),
                 Severity::Warning | Severity::Repaired => notices.push(format!("mesh: {}", problem.message)),
             }
         }
         let mut connectivity = Connectivity::of(&mesh.quads, mesh.points.len()).map_err(|defects| {
-            invalid(format!(
+            Failure::invalid(format!(
                 "mesh: the quadrilaterals form no oriented surface: {defects:?}"
             ))
         })?;
@@ -113,7 +106,7 @@ impl Problem {
             mesh.normals.is_some() && matches!(settings.vertex_normals, VertexNormals::Auto | VertexNormals::Given);
         let mut creases = None;
         if settings.keeps_creases() {
-            let sharp = creases::sharp(&mesh, &connectivity, &sources, settings).map_err(invalid)?;
+            let sharp = creases::sharp(&mesh, &connectivity, &sources, settings).map_err(Failure::invalid)?;
             if sharp.contains(&true) {
                 creases = creases::cut(&mut mesh, &mut connectivity, sharp, &mut notices);
             } else if truth.is_none() && settings.crease_angle.is_none() {
@@ -134,7 +127,7 @@ impl Problem {
             let corners = sources.corners.as_ref();
             let estimated =
                 creases::normals_by_side(creases, &mesh, &connectivity, truth.as_ref(), corners, &mut normals)
-                    .map_err(|reason| invalid(format!("mesh: {reason}")))?;
+                    .map_err(|reason| Failure::invalid(format!("mesh: {reason}")))?;
             if given && estimated > 0 {
                 notices.push(format!(
                     "the normals given at {estimated} vertices on creases belong to no side: replaced there by those estimated \
@@ -173,21 +166,21 @@ fn given(
     let part = model
         .parts
         .get("mesh")
-        .ok_or_else(|| invalid("the model has no `mesh`; give it a file or a generator".to_string()))?;
+        .ok_or_else(|| Failure::invalid("the model has no `mesh`; give it a file or a generator"))?;
     if let (Part::Generated { .. }, Some(field)) = (part, &settings.crease_field) {
-        return Err(invalid(format!(
+        return Err(Failure::invalid(format!(
             "crease_field = \"{field}\" names a field of a file, but the mesh is generated; leave it out"
         )));
     }
     if matches!(part, Part::Generated { .. }) && settings.crease_normals {
-        return Err(invalid(
-            "crease_normals reads the normals of a file's corners, but the mesh is generated; leave it out".to_string(),
+        return Err(Failure::invalid(
+            "crease_normals reads the normals of a file's corners, but the mesh is generated; leave it out",
         ));
     }
     match part {
         Part::Generated { generator, parameters } if generator == RAYS || generator == DUAL_CONTOURING => {
             let Some(sampled) = sampled else {
-                return Err(invalid(format!(
+                return Err(Failure::invalid(format!(
                     "the generator \"{generator}\" needs the model's `surface`, and the model has none; add surface = \
                      \"FILE\" with a closed triangulated surface"
                 )));
@@ -200,7 +193,8 @@ fn given(
                 sampled.by_dual_contouring(cells, smoothing, observer)
             };
             Ok(Given {
-                mesh: mesh.map_err(|reason| invalid(format!("generator \"{generator}\" of the mesh: {reason}")))?,
+                mesh: mesh
+                    .map_err(|reason| Failure::invalid(format!("generator \"{generator}\" of the mesh: {reason}")))?,
                 truth: None,
                 sources: Sources::default(),
                 on_sampled: true,
@@ -208,7 +202,7 @@ fn given(
         }
         Part::Generated { generator, parameters } => {
             let generated = surface::generate_surface(generator, parameters)
-                .map_err(|reason| invalid(format!("generator \"{generator}\" of the mesh: {reason}")))?;
+                .map_err(|reason| Failure::invalid(format!("generator \"{generator}\" of the mesh: {reason}")))?;
             let listed = generated.creased.as_ref().map(|creased| creased.sharp.clone());
             let pieces = generated.creased.map(Truth::Pieces);
             Ok(Given {
@@ -240,7 +234,7 @@ fn normals(
     let given = mesh.normals.take();
     match (settings.vertex_normals, given, truth) {
         (VertexNormals::Auto | VertexNormals::Given, Some(normals), _) => Ok(normals),
-        (VertexNormals::Given, None, _) => Err(invalid(
+        (VertexNormals::Given, None, _) => Err(Failure::invalid(
             "the mesh has no normals; add them to the file (OBJ `vn`, VTK `NORMALS`), or use vertex_normals = \
              \"estimated\""
                 .to_string(),
@@ -249,13 +243,12 @@ fn normals(
         | (VertexNormals::Surface, _, Some(Truth::Sampled(surface))) => {
             Ok(mesh.points.iter().map(|&point| surface.project(point).1).collect())
         }
-        (VertexNormals::Surface, _, _) => Err(invalid(
-            "the model has no `surface` to take normals from; add one, or use vertex_normals = \"estimated\""
-                .to_string(),
+        (VertexNormals::Surface, _, _) => Err(Failure::invalid(
+            "the model has no `surface` to take normals from; add one, or use vertex_normals = \"estimated\"",
         )),
         (VertexNormals::Auto | VertexNormals::Estimated, _, _) => {
             notices.push("normals estimated from the quadrilaterals around each vertex".to_string());
-            vertex_normals::estimate(mesh, connectivity).map_err(|reason| invalid(format!("mesh: {reason}")))
+            vertex_normals::estimate(mesh, connectivity).map_err(|reason| Failure::invalid(format!("mesh: {reason}")))
         }
     }
 }
@@ -263,16 +256,16 @@ fn normals(
 /// The edges that a text file lists.
 fn read_creases(part: &Part, mesh: &QuadrilateralMesh, sources: &Sources) -> Result<Vec<[u32; 2]>, Failure> {
     let Part::File { name, bytes, .. } = part else {
-        return Err(invalid("the model's `creases` must be a file".to_string()));
+        return Err(Failure::invalid("the model's `creases` must be a file"));
     };
     let text = std::str::from_utf8(bytes).map_err(|error| {
-        invalid(format!(
+        Failure::invalid(format!(
             "{name}: byte {} is no text; write two vertex numbers a line",
             error.valid_up_to()
         ))
     })?;
     let vertices = sources.vertices.unwrap_or(mesh.points.len());
-    creases::parse(text, vertices).map_err(|reason| invalid(format!("{name}: {reason}")))
+    creases::parse(text, vertices).map_err(|reason| Failure::invalid(format!("{name}: {reason}")))
 }
 
 fn read_quads(
@@ -282,7 +275,7 @@ fn read_quads(
     settings: &Settings,
     notices: &mut Vec<String>,
 ) -> Result<Given, Failure> {
-    let content = format::read(name, bytes).map_err(|error| invalid(error.to_string()))?;
+    let content = format::read(name, bytes).map_err(|error| Failure::invalid(error.to_string()))?;
     notices.extend(content.notices.iter().map(|notice| format!("{name}: {notice}")));
     let split = parameters.get("triangles").and_then(Value::as_str) == Some("split");
     if !split && !content.triangles.is_empty() {
@@ -292,7 +285,7 @@ fn read_quads(
         } else {
             format!("there are {triangles} triangles among {quads} quadrilaterals")
         };
-        return Err(invalid(format!(
+        return Err(Failure::invalid(format!(
             "{name}: {what}, the first with vertices {:?} (counted from 0); remesh it with quadrilaterals, or write mesh = {{ \
              file = \"{name}\", triangles = \"split\" }} to cut every triangle into three quadrilaterals and every \
              quadrilateral into four",
@@ -300,8 +293,8 @@ fn read_quads(
         )));
     }
     let triangles = if split { Triangles::Split } else { Triangles::Refuse };
-    let (mut mesh, found) =
-        QuadrilateralMesh::from_content(&content, triangles).map_err(|reason| invalid(format!("{name}: {reason}")))?;
+    let (mut mesh, found) = QuadrilateralMesh::from_content(&content, triangles)
+        .map_err(|reason| Failure::invalid(format!("{name}: {reason}")))?;
     notices.extend(found.into_iter().map(|notice| format!("{name}: {notice}")));
     let scale = parameters.get("scale").and_then(Value::as_f64).unwrap_or(1.0);
     for point in &mut mesh.points {
@@ -309,14 +302,14 @@ fn read_quads(
     }
     let labels = match &settings.crease_field {
         Some(field) if settings.keeps_creases() => {
-            Some(creases::labels(&content, field).map_err(|reason| invalid(format!("{name}: {reason}")))?)
+            Some(creases::labels(&content, field).map_err(|reason| Failure::invalid(format!("{name}: {reason}")))?)
         }
         _ => None,
     };
     let corners = if settings.keeps_creases() && settings.crease_normals {
         let normals = format::quad_corner_normals(bytes).filter(|normals| normals.len() == mesh.quads.len());
         let normals = normals.ok_or_else(|| {
-            invalid(format!(
+            Failure::invalid(format!(
                 "{name}: crease_normals needs an OBJ file of quadrilaterals alone, each corner with a normal (`f 1//1 2//1 \
                  3//1 4//1`); leave crease_normals out, or use crease_angle"
             ))
@@ -374,14 +367,14 @@ fn read_surface(part: &Part, notices: &mut Vec<String>) -> Result<TriangleMesh, 
         } => (name, bytes, parameters),
         Part::Generated { generator, parameters } => {
             let generated = surface::generate_surface(generator, parameters)
-                .map_err(|reason| invalid(format!("generator \"{generator}\" of the surface: {reason}")))?;
+                .map_err(|reason| Failure::invalid(format!("generator \"{generator}\" of the surface: {reason}")))?;
             return Ok(TriangleMesh {
                 points: generated.mesh.points,
                 cells: halves(&generated.mesh.quads).collect(),
             });
         }
     };
-    let content = format::read(name, bytes).map_err(|error| invalid(error.to_string()))?;
+    let content = format::read(name, bytes).map_err(|error| Failure::invalid(error.to_string()))?;
     notices.extend(content.notices.iter().map(|notice| format!("{name}: {notice}")));
     let scale = parameters.get("scale").and_then(Value::as_f64).unwrap_or(1.0);
     let mut cells = content.triangles;
@@ -401,7 +394,7 @@ fn read_surface(part: &Part, notices: &mut Vec<String>) -> Result<TriangleMesh, 
             "unreferenced-vertex" | "degenerate-cell" | "duplicate-cell"
         );
         if problem.severity == Severity::Error && !harmless {
-            return Err(invalid(format!("{name}: {}", problem.message)));
+            return Err(Failure::invalid(format!("{name}: {}", problem.message)));
         }
         notices.push(format!("{name}: {}", problem.message));
     }

@@ -360,10 +360,8 @@ impl Settings {
             table.entry(*name).or_insert_with(|| Value::from(chosen));
         }
         table.entry("repair").or_insert(Value::from(!paper));
-        let mut settings: Settings = serde_json::from_value(Value::Object(table)).map_err(|error| Failure {
-            kind: "invalid-input".to_string(),
-            reason: format!("settings of g1-surface: {error}"),
-        })?;
+        let mut settings: Settings = serde_json::from_value(Value::Object(table))
+            .map_err(|error| Failure::invalid(format!("settings of g1-surface: {error}")))?;
         // Their order does not matter.
         settings.export.sort();
         settings.export.dedup();

@@ -43,13 +43,6 @@ pub struct Domain<'a> {
     pub rim: Vec<bool>,
 }
 
-fn invalid(reason: String) -> Failure {
-    Failure {
-        kind: "invalid-input".to_string(),
-        reason,
-    }
-}
-
 /// The triangles beside each triangle of a mesh, which has to be an oriented manifold: handles and boundary loops rely
 /// on it.
 ///
@@ -59,14 +52,14 @@ pub fn manifold(mesh: &TriangleMesh) -> Result<Facets<3>, Failure> {
     let vertices = mesh.points.len();
     let facets = connectivity::facets(&mesh.cells, vertices);
     if facets.crowded > 0 {
-        return Err(invalid(format!(
+        return Err(Failure::invalid(format!(
             "{} edges have three or more triangles, the first at triangle {} (counted from 0); the surface must be a \
              manifold: separate the sheets there",
             facets.crowded, facets.first_crowded
         )));
     }
     if let Some(&pinched) = connectivity::pinched_vertices(&mesh.cells, vertices, &facets).first() {
-        return Err(invalid(format!(
+        return Err(Failure::invalid(format!(
             "parts of the surface touch in the single vertex {pinched} (counted from 0); the surface must be a manifold: \
              split the vertex"
         )));
@@ -76,7 +69,7 @@ pub fn manifold(mesh: &TriangleMesh) -> Result<Facets<3>, Failure> {
             let (from, to) = (cell[(corner + 1) % 3], cell[(corner + 2) % 3]);
             let same = |other: &[u32; 3]| (0..3).any(|i| other[i] == from && other[(i + 1) % 3] == to);
             if mesh.cells.get(neighbour as usize).is_some_and(same) {
-                return Err(invalid(format!(
+                return Err(Failure::invalid(format!(
                     "triangles {index} and {neighbour} (counted from 0) run along their edge from vertex {from} to {to} in the \
                      same direction; turn one of them round, so that all are oriented alike (a surface with one side, \
                      such as a Moebius strip, has no such orientation)"
@@ -150,7 +143,7 @@ impl<'a> Domain<'a> {
 
     fn check(&self) -> Result<(), Failure> {
         if self.count(Place::Interior) == 0 {
-            return Err(invalid(
+            return Err(Failure::invalid(
                 "the conditions leave no vertex free, so there is nothing to solve for; fix fewer vertices or take a \
                  finer mesh"
                     .to_string(),
@@ -174,7 +167,7 @@ impl<'a> Domain<'a> {
             } else {
                 "the mesh".to_string()
             };
-            return Err(invalid(format!(
+            return Err(Failure::invalid(format!(
                 "{parts} with vertex {vertex} (counted from 0) has no fixed vertex, so its place is open; fix some of its \
                  vertices"
             )));
@@ -199,7 +192,7 @@ impl<'a> Domain<'a> {
         };
         match (0..self.places.len()).find(|&vertex| thin(vertex)) {
             None => Ok(()),
-            Some(vertex) => Err(invalid(format!(
+            Some(vertex) => Err(Failure::invalid(format!(
                 "the fixed region is too thin: vertex {vertex} (counted from 0) lies on the boundary of the mesh, with \
                  fewer than {order} rings of fixed vertices between it and the free ones; fix {order} rings or use \
                  condition = \"curve\""
@@ -220,13 +213,13 @@ impl<'a> Domain<'a> {
         }
         for (vertex, &place) in self.places.iter().enumerate() {
             if place == Place::Interior && on_edge[vertex] {
-                return Err(invalid(format!(
+                return Err(Failure::invalid(format!(
                     "vertex {vertex} (counted from 0) is free but lies on the curve that bounds the domain; fix it, so \
                      that the curve is made of edges between fixed vertices"
                 )));
             }
             if place == Place::Boundary && !on_edge[vertex] {
-                return Err(invalid(format!(
+                return Err(Failure::invalid(format!(
                     "fixed vertex {vertex} (counted from 0) lies within the domain and on none of its boundary edges; \
                      curves must be made of edges: use condition = \"region\" for fixed points"
                 )));

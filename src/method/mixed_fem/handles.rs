@@ -15,13 +15,6 @@ pub struct Roles {
     pub motion: Vec<[f64; 3]>,
 }
 
-fn invalid(reason: String) -> Failure {
-    Failure {
-        kind: "invalid-input".to_string(),
-        reason,
-    }
-}
-
 /// The boundary loops of a manifold, each as its vertices in the order of the triangles' edges, the longest first; of two
 /// equally long ones that with the smaller first vertex.
 pub fn boundary_loops(mesh: &TriangleMesh) -> Vec<Vec<u32>> {
@@ -89,7 +82,9 @@ pub fn resolve(model: &Model, handles: &[Handle], mut free: Vec<bool>) -> Result
             Select::Plane => {
                 let (center, normal) = (place(handle.center), handle.normal.unwrap_or_default());
                 if length(normal) == 0.0 {
-                    return Err(invalid(format!("handle {index} (from 0): the plane's normal is zero")));
+                    return Err(Failure::invalid(format!(
+                        "handle {index} (from 0): the plane's normal is zero"
+                    )));
                 }
                 let above = |point: &[f64; 3]| dot(subtract(*point, center), normal) >= 0.0;
                 mesh.points.iter().map(above).collect()
@@ -107,7 +102,7 @@ pub fn resolve(model: &Model, handles: &[Handle], mut free: Vec<bool>) -> Result
             }
             Select::Loop => {
                 let wanted = loops.get(handle.boundary_loop as usize).ok_or_else(|| {
-                    invalid(format!(
+                    Failure::invalid(format!(
                         "handle {index} (from 0): there is no boundary loop {} (from 0); the mesh has {}",
                         handle.boundary_loop,
                         loops.len()
@@ -119,7 +114,7 @@ pub fn resolve(model: &Model, handles: &[Handle], mut free: Vec<bool>) -> Result
             }
             Select::File => {
                 let numbers = model.selection.as_ref().ok_or_else(|| {
-                    invalid(format!(
+                    Failure::invalid(format!(
                         "handle {index} (from 0): the model has no `selection`; give it a file with a number for every vertex"
                     ))
                 })?;
@@ -141,7 +136,7 @@ pub fn resolve(model: &Model, handles: &[Handle], mut free: Vec<bool>) -> Result
         }
         let chosen: Vec<usize> = (0..vertices).filter(|&vertex| selected[vertex]).collect();
         if chosen.is_empty() {
-            return Err(invalid(format!(
+            return Err(Failure::invalid(format!(
                 "handle {index} (from 0) selects no vertex; the mesh's box is from {:?} to {:?}",
                 corners[0], corners[1]
             )));

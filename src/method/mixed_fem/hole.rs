@@ -11,13 +11,6 @@ use crate::mesh::{TriangleMesh, cross, dot, length, subtract};
 use crate::method::Failure;
 use std::f64::consts::TAU;
 
-fn invalid(reason: String) -> Failure {
-    Failure {
-        kind: "invalid-input".to_string(),
-        reason,
-    }
-}
-
 /// Fills the longest loop or all of them; the patches become the model's domain.
 ///
 /// # Errors
@@ -25,8 +18,8 @@ fn invalid(reason: String) -> Failure {
 pub fn fill(model: &mut Model, all: bool) -> Result<(), Failure> {
     let mut loops = boundary_loops(&model.mesh);
     if loops.is_empty() {
-        return Err(invalid(
-            "the mesh has no boundary, so there is no hole to fill; use fill = \"none\"".to_string(),
+        return Err(Failure::invalid(
+            "the mesh has no boundary, so there is no hole to fill; use fill = \"none\"",
         ));
     }
     if !all {
@@ -61,7 +54,7 @@ fn patch(mesh: &mut TriangleMesh, boundary: &[u32]) -> Result<(), Failure> {
         .collect();
     let perimeter: f64 = sides.iter().sum();
     if count < 3 || !(perimeter > 0.0) {
-        return Err(invalid(format!("a hole with {count} edges cannot be filled")));
+        return Err(Failure::invalid(format!("a hole with {count} edges cannot be filled")));
     }
     let radius = perimeter / TAU;
     let mut along = 0.0;
@@ -74,9 +67,9 @@ fn patch(mesh: &mut TriangleMesh, boundary: &[u32]) -> Result<(), Failure> {
         })
         .collect();
     let flat = fill_polygon(&polygon, perimeter / count as f64)
-        .map_err(|reason| invalid(format!("the hole at vertex {} (counted from 0): {reason}", rim[0])))?;
+        .map_err(|reason| Failure::invalid(format!("the hole at vertex {} (counted from 0): {reason}", rim[0])))?;
     if flat.points.len() < count {
-        return Err(invalid(format!(
+        return Err(Failure::invalid(format!(
             "the hole at vertex {} (counted from 0) degenerates",
             rim[0]
         )));
@@ -95,7 +88,7 @@ fn patch(mesh: &mut TriangleMesh, boundary: &[u32]) -> Result<(), Failure> {
 
 /// Harmonic extension of the places of the first vertices to the others.
 fn extend(flat: &TriangleMesh, places: &[[f64; 3]]) -> Result<Vec<[f64; 3]>, Failure> {
-    let failure = |error: String| invalid(format!("a patch has no harmonic extension: {error}"));
+    let failure = |error: String| Failure::invalid(format!("a patch has no harmonic extension: {error}"));
     let free: Vec<bool> = (0..flat.points.len()).map(|vertex| vertex >= places.len()).collect();
     let mut all = places.to_vec();
     all.resize(flat.points.len(), [0.0; 3]);

@@ -199,13 +199,6 @@ pub fn kind() -> &'static ModelKind {
     &KIND
 }
 
-fn invalid(reason: String) -> Failure {
-    Failure {
-        kind: "invalid-input".to_string(),
-        reason,
-    }
-}
-
 /// Reads or generates a model.
 ///
 /// # Errors
@@ -214,7 +207,7 @@ pub fn load(model: &LoadedModel) -> Result<Model, Failure> {
     let part = model
         .parts
         .get("mesh")
-        .ok_or_else(|| invalid("the model has no `mesh`; give it a file or a generator".to_string()))?;
+        .ok_or_else(|| Failure::invalid("the model has no `mesh`; give it a file or a generator"))?;
     let mut loaded = match part {
         Part::File {
             name,
@@ -257,7 +250,7 @@ fn generate(generator: &str, parameters: &Value) -> Result<Model, Failure> {
                     around + 8 - around % 8
                 },
             };
-            let made = band::joint(&joint).map_err(|reason| invalid(format!("mesh \"joint\": {reason}")))?;
+            let made = band::joint(&joint).map_err(|reason| Failure::invalid(format!("mesh \"joint\": {reason}")))?;
             return Ok(Model {
                 mesh: made.mesh,
                 inside: Some(made.inside),
@@ -281,7 +274,7 @@ fn generate(generator: &str, parameters: &Value) -> Result<Model, Failure> {
         }
         "cap" => {
             let mesh = band::cap(number("rings", 16) as usize, size("angle", 90.0).to_radians())
-                .map_err(|reason| invalid(format!("mesh \"cap\": {reason}")))?;
+                .map_err(|reason| Failure::invalid(format!("mesh \"cap\": {reason}")))?;
             return Ok(Model {
                 mesh,
                 ..Model::default()
@@ -292,13 +285,13 @@ fn generate(generator: &str, parameters: &Value) -> Result<Model, Failure> {
     let family = FAMILIES
         .iter()
         .find(|family| family.1 == word("family", "regular"))
-        .ok_or_else(|| invalid(format!("unknown family \"{}\"", word("family", "regular"))))?;
+        .ok_or_else(|| Failure::invalid(format!("unknown family \"{}\"", word("family", "regular"))))?;
     let domain = DOMAINS
         .iter()
         .find(|domain| domain.1 == generator)
-        .ok_or_else(|| invalid(format!("unknown generator \"{generator}\"")))?;
+        .ok_or_else(|| Failure::invalid(format!("unknown generator \"{generator}\"")))?;
     let planar = planar::generate(domain.0, family.0, number("cells", 32) as usize, number("seed", 1))
-        .map_err(|reason| invalid(format!("mesh \"{generator}\": {reason}")))?;
+        .map_err(|reason| Failure::invalid(format!("mesh \"{generator}\": {reason}")))?;
     Ok(Model {
         mesh: planar.mesh,
         inside: Some(planar.inside),
@@ -307,7 +300,7 @@ fn generate(generator: &str, parameters: &Value) -> Result<Model, Failure> {
 }
 
 fn read(name: &str, bytes: &[u8], scale: f64) -> Result<Model, Failure> {
-    let content = format::read(name, bytes).map_err(|error| invalid(format!("mesh: {error}")))?;
+    let content = format::read(name, bytes).map_err(|error| Failure::invalid(format!("mesh: {error}")))?;
     let Content {
         points,
         triangles,
@@ -321,12 +314,12 @@ fn read(name: &str, bytes: &[u8], scale: f64) -> Result<Model, Failure> {
         cells.extend(quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]));
     }
     if cells.is_empty() {
-        return Err(invalid(format!(
+        return Err(Failure::invalid(format!(
             "mesh: {name} holds no triangles; take the surface of the body"
         )));
     }
     if let Some(bad) = cells.iter().position(|[a, b, c]| a == b || b == c || a == c) {
-        return Err(invalid(format!(
+        return Err(Failure::invalid(format!(
             "mesh: triangle {bad} (counted from 0) of {name} names a vertex twice; remove it"
         )));
     }
@@ -348,7 +341,8 @@ fn read(name: &str, bytes: &[u8], scale: f64) -> Result<Model, Failure> {
 
 /// Reads a number a vertex.
 fn read_selection(name: &str, bytes: &[u8], vertices: usize) -> Result<Vec<i64>, Failure> {
-    let text = std::str::from_utf8(bytes).map_err(|_| invalid(format!("selection: {name} is no text file")))?;
+    let text =
+        std::str::from_utf8(bytes).map_err(|_| Failure::invalid(format!("selection: {name} is no text file")))?;
     let mut lines = text
         .lines()
         .enumerate()
@@ -360,7 +354,7 @@ fn read_selection(name: &str, bytes: &[u8], vertices: usize) -> Result<Vec<i64>,
     {
         let counts: Vec<&str> = first.split_whitespace().collect();
         if counts != ["1", &vertices.to_string()] {
-            return Err(invalid(format!(
+            return Err(Failure::invalid(format!(
                 "selection: {name} is for {} columns and {} rows, but the mesh has {vertices} vertices; it needs one number \
                  for each",
                 counts[0], counts[1]
@@ -376,7 +370,7 @@ fn read_selection(name: &str, bytes: &[u8], vertices: usize) -> Result<Vec<i64>,
             .ok()
             .filter(|number: &f64| number.fract() == 0.0 && number.abs() < 9e15)
             .ok_or_else(|| {
-                invalid(format!(
+                Failure::invalid(format!(
                     "selection: line {} of {name} is \"{}\", expected a whole number",
                     line + 1,
                     word.trim()
@@ -385,7 +379,7 @@ fn read_selection(name: &str, bytes: &[u8], vertices: usize) -> Result<Vec<i64>,
         numbers.push(number as i64);
     }
     if numbers.len() != vertices {
-        return Err(invalid(format!(
+        return Err(Failure::invalid(format!(
             "selection: {name} holds {} numbers, but the mesh has {vertices} vertices; give one for each",
             numbers.len()
         )));

@@ -126,13 +126,6 @@ pub struct Discretization<'a> {
     pub penalty: Vec<f64>,
 }
 
-fn invalid(reason: String) -> Failure {
-    Failure {
-        kind: "invalid-input".to_string(),
-        reason,
-    }
-}
-
 impl<'a> Discretization<'a> {
     /// Sets up a scheme. `stabilisation` counts for the stabilised one alone.
     ///
@@ -150,7 +143,7 @@ impl<'a> Discretization<'a> {
         if scheme == Scheme::Region {
             domain.check_rings(order)?;
             if mass == Mass::Full {
-                return Err(invalid(
+                return Err(Failure::invalid(
                     "region conditions need a lumped mass matrix, because v is known outside the domain only with its \
                      help; use mass = \"hybrid\" or \"barycentric\""
                         .to_string(),
@@ -295,7 +288,7 @@ impl<'a> Discretization<'a> {
         let hessian = match (&data.taylor, second_order) {
             (Some(taylor), true) => Some(taylor.hessian),
             (None, true) => {
-                return Err(invalid(
+                return Err(Failure::invalid(
                     "the second-order ring needs second derivatives on the boundary, which a formula gives and a surface \
                      does not; use triharmonic-curve = \"stabilised\""
                         .to_string(),
@@ -395,7 +388,7 @@ impl<'a> Discretization<'a> {
             }
         }
         if !self.unknown[0].contains(&true) {
-            return Err(invalid(
+            return Err(Failure::invalid(
                 "every free vertex touches the boundary, so the reduction to the first ring leaves nothing to solve for; \
                  take a finer mesh"
                     .to_string(),

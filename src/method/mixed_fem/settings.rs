@@ -153,11 +153,10 @@ impl Settings {
     /// # Errors
     /// A value that the declaration does not allow.
     pub fn resolve(settings: &Value) -> Result<Settings, Failure> {
-        serde_json::from_value(Value::Object(fill(FIELDS, settings))).map_err(|error| Failure {
-            kind: "invalid-input".to_string(),
-            reason: format!(
+        serde_json::from_value(Value::Object(fill(FIELDS, settings))).map_err(|error| {
+            Failure::invalid(format!(
                 "settings of mixed-fem: {error}; places such as \"min\" or \"center\" are lists of three numbers"
-            ),
+            ))
         })
     }
 

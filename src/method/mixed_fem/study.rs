@@ -18,13 +18,6 @@ use crate::method::{Failure, Outcome};
 use crate::optimize::Observer;
 use std::collections::BTreeMap;
 
-pub(super) fn invalid(reason: String) -> Failure {
-    Failure {
-        kind: "invalid-input".to_string(),
-        reason,
-    }
-}
-
 /// Ends a computation that is to stop.
 pub(super) fn go_on(observer: &dyn Observer) -> Result<(), Failure> {
     match observer.stop() {
@@ -45,7 +38,7 @@ pub(super) fn go_on(observer: &dyn Observer) -> Result<(), Failure> {
 /// For input that cannot be used, singular systems, and when the observer asks to stop.
 pub fn run(model: Model, settings: &Settings, observer: &mut dyn Observer) -> Result<Outcome, Failure> {
     let function = function::find(&settings.function)
-        .ok_or_else(|| invalid(format!("unknown function \"{}\"", settings.function)))?;
+        .ok_or_else(|| Failure::invalid(format!("unknown function \"{}\"", settings.function)))?;
     let plain = settings.handles.is_none() && settings.fill == Fill::None;
     match settings.data {
         DataKind::Function => function_study(model, function, settings, observer),
@@ -101,7 +94,7 @@ fn function_study(
     observer: &mut dyn Observer,
 ) -> Result<Outcome, Failure> {
     if !model.is_planar() {
-        return Err(invalid(
+        return Err(Failure::invalid(
             "data = \"function\" needs a mesh in the plane, whose points have one and the same third coordinate; use \
              data = \"position\" or \"displacement\" on a surface"
                 .to_string(),
@@ -218,7 +211,7 @@ fn solve(
         vec![true; domain.mesh.cells.len()]
     };
     let operators = SurfaceOperators::on_graph(domain.mesh, &domain.graph, &selected)
-        .map_err(|error| invalid(format!("mesh: {error}")))?;
+        .map_err(|error| Failure::invalid(format!("mesh: {error}")))?;
     let discretization = Discretization::new(
         domain,
         &operators,

@@ -7,7 +7,7 @@ use super::model::Model;
 use super::scheme::{Data, Discretization, Scheme};
 use super::seam::{Sides, jumps};
 use super::settings::{Condition, DataKind, Fill, Settings};
-use super::study::{Quiet, Report, compare, go_on, invalid, shrink, touching};
+use super::study::{Quiet, Report, compare, go_on, shrink, touching};
 use super::surface_data::{Prescribed, prescribe};
 use super::system::System;
 use crate::fem::surface::SurfaceOperators;
@@ -50,7 +50,7 @@ pub(super) fn run(mut model: Model, settings: &Settings, observer: &mut dyn Obse
         vec![true; mesh.cells.len()]
     };
     let operators = SurfaceOperators::on_graph(mesh, &domain.graph, &selected)
-        .map_err(|error| invalid(format!("mesh: {error}")))?;
+        .map_err(|error| Failure::invalid(format!("mesh: {error}")))?;
     let sides = Sides::new(&domain);
     let rest = model.targets.as_ref().unwrap_or(&mesh.points);
     let mut system: Option<System> = None;
@@ -147,8 +147,8 @@ fn roles(model: &Model, settings: &Settings) -> Result<Roles, Failure> {
     let mut free = none.free;
     let loops = handles::boundary_loops(&model.mesh);
     if loops.is_empty() {
-        return Err(invalid(
-            "the surface has no boundary and no handles, so nothing is fixed; add handles to [settings]".to_string(),
+        return Err(Failure::invalid(
+            "the surface has no boundary and no handles, so nothing is fixed; add handles to [settings]",
         ));
     }
     loops.iter().flatten().for_each(|&vertex| free[vertex as usize] = false);

@@ -140,14 +140,11 @@ fn check_size(template: &Surface, settings: &Settings) -> Result<(), Failure> {
         corners * 4f64.powi(levels as i32 - 1)
     };
     if faces > MOST_FACES {
-        return Err(Failure {
-            kind: "invalid-input".to_string(),
-            reason: format!(
-                "a template of {} faces, subdivided {levels} times (subdivisions and refinements), has {faces:.1e} faces; \
+        return Err(Failure::invalid(format!(
+            "a template of {} faces, subdivided {levels} times (subdivisions and refinements), has {faces:.1e} faces; \
                  {MOST_FACES:e} are the limit: take a coarser template or fewer levels",
-                template.faces()
-            ),
-        });
+            template.faces()
+        )));
     }
     Ok(())
 }

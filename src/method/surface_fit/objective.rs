@@ -124,10 +124,7 @@ impl<'a> FitObjective<'a> {
             }
         };
         let prepared = |role: &str, points: &[[f64; 3]], cells: &[[u32; 3]]| {
-            SquaredDistance::new(points, cells).map_err(|error| Failure {
-                kind: "invalid-input".to_string(),
-                reason: format!("{role}: {error}"),
-            })
+            SquaredDistance::new(points, cells).map_err(|error| Failure::invalid(format!("{role}: {error}")))
         };
         let count = fitted.points.len();
         let all_edges = fitted.edges();

@@ -212,10 +212,8 @@ fn to_points(fit: &TriangleMesh, points: &[[f64; 3]]) -> Hausdorff {
 
 /// The isotropic term from a surface to the samples.
 fn isotropic(surface: &TriangleMesh, samples: &Samples) -> Result<f64, Failure> {
-    let mut term = SquaredDistance::new(&surface.points, &surface.cells).map_err(|error| Failure {
-        kind: "invalid-input".to_string(),
-        reason: format!("fit: {error}"),
-    })?;
+    let mut term = SquaredDistance::new(&surface.points, &surface.cells)
+        .map_err(|error| Failure::invalid(format!("fit: {error}")))?;
     let tree = PointTree::new(&samples.points);
     Ok(term.evaluate(&surface.points, &tree, &Options::default(), Wanted::default()))
 }

@@ -42,14 +42,14 @@ impl Units {
     /// A target without points or without size.
     fn of(target: &TriangleMesh) -> Result<Units, Failure> {
         let Some([low, high]) = mesh::bounding_box(&target.points) else {
-            return Err(invalid("target: there are no points".to_string()));
+            return Err(Failure::invalid("target: there are no points"));
         };
         let extents: [f64; 3] = std::array::from_fn(|axis| high[axis] - low[axis]);
         let longest = extents.into_iter().fold(0.0, f64::max);
         // In units of the longest extent, whose square may underflow.
         let diagonal = longest * extents.iter().map(|x| (x / longest).powi(2)).sum::<f64>().sqrt();
         if !(diagonal > 0.0 && diagonal.is_finite()) {
-            return Err(invalid(format!(
+            return Err(Failure::invalid(format!(
                 "target: {} points in a box with the diagonal {}; give points that lie apart and within range",
                 target.points.len(),
                 if longest > 0.0 { diagonal } else { 0.0 }
@@ -73,13 +73,6 @@ impl Units {
     }
 }
 
-fn invalid(reason: String) -> Failure {
-    Failure {
-        kind: "invalid-input".to_string(),
-        reason,
-    }
-}
-
 impl Problem {
     /// Reads or generates the model.
     ///
@@ -90,7 +83,7 @@ impl Problem {
             model
                 .parts
                 .get(role)
-                .ok_or_else(|| invalid(format!("the model has no `{role}`; give it a file or a generator")))
+                .ok_or_else(|| Failure::invalid(format!("the model has no `{role}`; give it a file or a generator")))
         };
         let mut notices = Vec::new();
         let mut only_points = false;
@@ -99,7 +92,8 @@ impl Problem {
                 let mut parameters = parameters.clone();
                 let cloud = parameters.as_object_mut().and_then(|table| table.remove("cloud"));
                 only_points = cloud.and_then(|cloud| cloud.as_bool()).unwrap_or(false);
-                generate_shape(generator, &parameters).map_err(|message| invalid(format!("target: {message}")))?
+                generate_shape(generator, &parameters)
+                    .map_err(|message| Failure::invalid(format!("target: {message}")))?
             }
             Part::File { name, bytes, .. } => match points(name, bytes, &mut notices)? {
                 Some(points) => TriangleMesh {
@@ -113,17 +107,18 @@ impl Problem {
         let target = units.scaled(target);
         // A template is made on the scaled target, whose size no rounding and no underflow can spoil.
         let Some([low, high]) = mesh::bounding_box(&target.points) else {
-            return Err(invalid("target: there are no points".to_string()));
+            return Err(Failure::invalid("target: there are no points"));
         };
         let mut near = false;
         let template = match part("template")? {
             Part::Generated { generator, parameters } if generator == VOXELS => {
                 near = true;
                 let quads = parameters.get("quads").and_then(|quads| quads.as_u64()).unwrap_or(384);
-                voxels::template(&target, quads as usize).map_err(|message| invalid(format!("template: {message}")))?
+                voxels::template(&target, quads as usize)
+                    .map_err(|message| Failure::invalid(format!("template: {message}")))?
             }
             Part::Generated { generator, parameters } => generate_template(generator, parameters, [low, high])
-                .map_err(|message| invalid(format!("template: {message}")))?,
+                .map_err(|message| Failure::invalid(format!("template: {message}")))?,
             Part::File {
                 name,
                 bytes,
@@ -165,7 +160,7 @@ impl Problem {
         let Units { centre, diagonal } = units;
         if target.cells.is_empty() {
             if target.points.len() < 4 {
-                return Err(invalid(format!(
+                return Err(Failure::invalid(format!(
                     "target: {} points are no cloud to fit; give more points, or a surface",
                     target.points.len()
                 )));
@@ -175,13 +170,13 @@ impl Problem {
                 target.points.len()
             ));
         } else if !(area > 1e-14) {
-            return Err(invalid(format!(
+            return Err(Failure::invalid(format!(
                 "target: {} triangles have {area:e} of the squared diagonal as their area; give a surface with area",
                 target.cells.len()
             )));
         }
         if template.faces() == 0 {
-            return Err(invalid("template: there are no faces; give a surface".to_string()));
+            return Err(Failure::invalid("template: there are no faces; give a surface"));
         }
         let flat = target.areas().iter().filter(|&&area| !(area > 0.0)).count();
         if flat > 0 {
@@ -228,10 +223,10 @@ impl Problem {
 
 /// The points of a file that holds nothing else.
 fn points(name: &str, bytes: &[u8], notices: &mut Vec<String>) -> Result<Option<Vec<[f64; 3]>>, Failure> {
-    if let Some(points) = cloud::read(name, bytes).map_err(|message| invalid(format!("target: {message}")))? {
+    if let Some(points) = cloud::read(name, bytes).map_err(|message| Failure::invalid(format!("target: {message}")))? {
         return Ok(Some(points));
     }
-    let content = format::read(name, bytes).map_err(|error| invalid(format!("target: {error}")))?;
+    let content = format::read(name, bytes).map_err(|error| Failure::invalid(format!("target: {error}")))?;
     let cells = content.cells();
     if content.points.is_empty() || cells.count() > 0 {
         return Ok(None);
@@ -241,7 +236,7 @@ fn points(name: &str, bytes: &[u8], notices: &mut Vec<String>) -> Result<Option<
         .iter()
         .position(|point| point.iter().any(|x| !x.is_finite()))
     {
-        return Err(invalid(format!(
+        return Err(Failure::invalid(format!(
             "target: {name}: point {index} (counted from 0) has a coordinate that is not finite"
         )));
     }
@@ -250,15 +245,15 @@ fn points(name: &str, bytes: &[u8], notices: &mut Vec<String>) -> Result<Option<
 }
 
 fn read(name: &str, bytes: &[u8], role: &str, notices: &mut Vec<String>) -> Result<Surface, Failure> {
-    let content = format::read(name, bytes).map_err(|error| invalid(format!("{role}: {error}")))?;
+    let content = format::read(name, bytes).map_err(|error| Failure::invalid(format!("{role}: {error}")))?;
     notices.extend(content.notices.iter().map(|notice| format!("{role}: {notice}")));
-    Surface::from_content(&content).map_err(|message| invalid(format!("{role}: {name}: {message}")))
+    Surface::from_content(&content).map_err(|message| Failure::invalid(format!("{role}: {name}: {message}")))
 }
 
 /// Stretches a template onto a box, axis by axis.
 fn stretch(template: &mut Surface, [low, high]: [[f64; 3]; 2]) -> Result<(), Failure> {
     let Some([from, to]) = mesh::bounding_box(&template.points) else {
-        return Err(invalid("template: there are no points".to_string()));
+        return Err(Failure::invalid("template: there are no points"));
     };
     for point in &mut template.points {
         *point = std::array::from_fn(|axis| {

@@ -68,10 +68,8 @@ pub fn sample(
     } else {
         vertices
     };
-    let mut term = SquaredDistance::new(&target.points, &target.cells).map_err(|error| Failure {
-        kind: "invalid-input".to_string(),
-        reason: format!("target: {error}"),
-    })?;
+    let mut term = SquaredDistance::new(&target.points, &target.cells)
+        .map_err(|error| Failure::invalid(format!("target: {error}")))?;
     let start = scatter(&target.points, &target.cells, count.max(4), settings.seed);
     let relaxation = Relaxation {
         iterations: settings.sampling_iterations,

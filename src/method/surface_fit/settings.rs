@@ -396,15 +396,12 @@ impl Settings {
                 *value = Value::from(vec![value.clone()]);
             }
         }
-        let settings: Settings = serde_json::from_value(Value::Object(table)).map_err(|error| Failure {
-            kind: "invalid-input".to_string(),
-            reason: format!("settings of surface-fit: {error}"),
-        })?;
+        let settings: Settings = serde_json::from_value(Value::Object(table))
+            .map_err(|error| Failure::invalid(format!("settings of surface-fit: {error}")))?;
         match empty_list(&settings) {
-            Some(name) => Err(Failure {
-                kind: "invalid-input".to_string(),
-                reason: format!("settings of surface-fit: {name} is an empty list; give one value a stage"),
-            }),
+            Some(name) => Err(Failure::invalid(format!(
+                "settings of surface-fit: {name} is an empty list; give one value a stage"
+            ))),
             None => Ok(settings),
         }
     }

@@ -9,8 +9,8 @@
 
 use super::distances::fine_intervals;
 use super::fit::Fit;
+use super::quality;
 use super::settings::{Adaptive, Indicator};
-use super::{invalid, quality};
 use crate::fem::boundary::Boundary;
 use crate::fem::space::Space;
 use crate::geometry::closest_point::{ClosestPoint, Nearest};
@@ -109,7 +109,7 @@ fn raised_by_energy(fit: &Fit<'_>, adaptive: &Adaptive) -> Result<Option<Vec<usi
     if up == *orders {
         return Ok(None);
     }
-    let space = Space::new(&fit.volume, &fit.topology, settings.basis, &up).map_err(invalid)?;
+    let space = Space::new(&fit.volume, &fit.topology, settings.basis, &up).map_err(Failure::invalid)?;
     let x = fit.space.transfer(&fit.x, &space);
     let mut old = vec![false; space.nodes];
     for node in fit.space.counterparts(&space).into_iter().flatten() {
@@ -149,7 +149,7 @@ fn raised_by_energy(fit: &Fit<'_>, adaptive: &Adaptive) -> Result<Option<Vec<usi
         surface: fit.surface_factor(),
         anisotropy: settings.anisotropy,
     })
-    .map_err(invalid)?;
+    .map_err(Failure::invalid)?;
     let mut sharers = vec![0.0; space.nodes];
     for cell in &space.cells {
         for (node, _) in cell.slots.iter().filter_map(|slot| slot.node()) {

@@ -1,6 +1,5 @@
 //! How near the fitted boundary and the target are, and how evenly parameters run along the elements' edges.
 
-use super::invalid;
 use super::target::Target;
 use crate::fem::boundary::Boundary;
 use crate::fem::space::Space;
@@ -54,7 +53,7 @@ pub fn measure_boundary(
         set("hausdorff_to_target", f64::NAN);
         set("distance_rms", percent(square.sqrt()));
     } else {
-        let measured = distance::hausdorff(&fitted, clean, stop).map_err(invalid)?;
+        let measured = distance::hausdorff(&fitted, clean, stop).map_err(Failure::invalid)?;
         set("hausdorff", measured.percent(measured.max()));
         set("hausdorff_to_target", measured.percent(measured.forward.max));
         set("hausdorff_from_target", measured.percent(measured.backward.max));

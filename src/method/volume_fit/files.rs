@@ -1,7 +1,6 @@
 //! The files of a fit for other programs: Lagrange cells for VTK and Gmsh, and the coefficients to the last bit.
 
 use super::fit::Fit;
-use super::invalid;
 use crate::fem::coefficient_file;
 use crate::fem::lagrange::{Lagrange, lagrange};
 use crate::mesh::format::{gmsh, vtu};
@@ -57,7 +56,7 @@ impl Fit<'_> {
                 }
                 "gmsh" => {
                     let form = self.form(x, gmsh::curved::HIGHEST_ORDER, "curved.msh")?;
-                    let bytes = gmsh::curved::write_curved(&form.mesh).map_err(invalid)?;
+                    let bytes = gmsh::curved::write_curved(&form.mesh).map_err(Failure::invalid)?;
                     files.insert("curved.msh".to_string(), bytes);
                 }
                 _ => {
@@ -70,7 +69,7 @@ impl Fit<'_> {
     }
 
     fn form(&mut self, x: &[f64], highest: usize, file: &str) -> Result<Lagrange, Failure> {
-        let form = lagrange(&self.volume, &self.space, &self.references, x, highest).map_err(invalid)?;
+        let form = lagrange(&self.volume, &self.space, &self.references, x, highest).map_err(Failure::invalid)?;
         if form.approximated > 0 {
             self.notices.push(format!(
                 "{file}: {} elements are interpolated, not exact: their functions are no polynomials, or their order is above \

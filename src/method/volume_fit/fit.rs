@@ -8,7 +8,7 @@ use super::target::{Closure, Target};
 use super::template::{Template, transform};
 use super::untangle::Softness;
 use super::validity::Certificates;
-use super::{COUNTERS, adaptivity, invalid, orientation, quality, subdivision, untangle};
+use super::{COUNTERS, adaptivity, orientation, quality, subdivision, untangle};
 use crate::energy::mapping::Density;
 use crate::fem::batches::{Batches, reference_volume, references_of_volume};
 use crate::fem::boundary::Boundary;
@@ -68,10 +68,10 @@ impl<'a> Fit<'a> {
         } else {
             &target.surface.points
         };
-        let [low, high] = bounding_box(points).ok_or_else(|| invalid("the target has no points".to_string()))?;
+        let [low, high] = bounding_box(points).ok_or_else(|| Failure::invalid("the target has no points"))?;
         let unit = mesh::diagonal(points);
         if !(unit > 0.0 && unit.is_finite()) {
-            return Err(invalid(format!(
+            return Err(Failure::invalid(format!(
                 "the target's box has the diagonal {unit}; it needs an extent"
             )));
         }
@@ -108,11 +108,11 @@ impl<'a> Fit<'a> {
             ));
         }
         target.place_sites();
-        let topology = volume.topology().map_err(invalid)?;
+        let topology = volume.topology().map_err(Failure::invalid)?;
         let template_surface = topology.boundary_triangles(&volume.points);
         let own_volume = volume.volume();
         if !(own_volume > 0.0) {
-            return Err(invalid(format!(
+            return Err(Failure::invalid(format!(
                 "the template has the volume {own_volume:e}; its elements are inside out or flat"
             )));
         }
@@ -132,7 +132,7 @@ impl<'a> Fit<'a> {
             }
         };
         if settings.levels > 0 && (map.is_some() || shell.is_some()) {
-            return Err(invalid(
+            return Err(Failure::invalid(
                 "a subdivision volume starts from straight hexahedra, not from a coefficient file or a shell; remove \
                  `subdivision_levels`"
                     .to_string(),
@@ -162,16 +162,16 @@ impl<'a> Fit<'a> {
         let (space, x) = match map {
             None => {
                 let orders = vec![first; volume.cells()];
-                let space = Space::new(&volume, &topology, settings.basis, &orders).map_err(invalid)?;
+                let space = Space::new(&volume, &topology, settings.basis, &orders).map_err(Failure::invalid)?;
                 let x = space.linear(&volume.points);
                 (space, x)
             }
             Some(map) if map.basis.name() == settings.basis.name() => {
-                let space = Space::new(&volume, &topology, settings.basis, &map.orders).map_err(invalid)?;
+                let space = Space::new(&volume, &topology, settings.basis, &map.orders).map_err(Failure::invalid)?;
                 (space, map.x)
             }
             Some(map) => {
-                return Err(invalid(format!(
+                return Err(Failure::invalid(format!(
                     "the template's coefficients belong to the basis {}, the job's is {}; set basis = \"{}\"",
                     map.basis.name(),
                     settings.basis.name(),
@@ -214,8 +214,8 @@ impl<'a> Fit<'a> {
 
     pub(super) fn volume_energy_of(&self, space: &Space, density: Density) -> Result<VolumeEnergy, Failure> {
         let quadrature = |kind: Kind| self.quadrature(kind);
-        let batches = Batches::new(space, &self.references, &quadrature).map_err(invalid)?;
-        VolumeEnergy::new(batches, density).map_err(invalid)
+        let batches = Batches::new(space, &self.references, &quadrature).map_err(Failure::invalid)?;
+        VolumeEnergy::new(batches, density).map_err(Failure::invalid)
     }
 
     /// The points of a cell: those of the settings, in repairs more, with some on corners and edges, where elements fail
@@ -258,7 +258,7 @@ impl<'a> Fit<'a> {
             settings.anisotropy,
             self.scale,
         );
-        Ok(Some(energy.map_err(invalid)?))
+        Ok(Some(energy.map_err(Failure::invalid)?))
     }
 
     /// Intervals between samples along an edge of the boundary.
@@ -286,7 +286,7 @@ impl<'a> Fit<'a> {
         if orders == self.space.orders {
             return Ok(());
         }
-        let next = Space::new(&self.volume, &self.topology, self.settings.basis, orders).map_err(invalid)?;
+        let next = Space::new(&self.volume, &self.topology, self.settings.basis, orders).map_err(Failure::invalid)?;
         self.x = self.space.transfer(&self.x, &next);
         self.space = next;
         Ok(())
@@ -394,7 +394,7 @@ fn check_target(
         return Ok(false);
     }
     if target.sites.is_empty() {
-        return Err(invalid("every triangle of the target has no area".to_string()));
+        return Err(Failure::invalid("every triangle of the target has no area"));
     }
     let closure = Closure::of(&target.surface);
     let volume = target.surface.enclosed_volume();

@@ -95,7 +95,7 @@ impl Method for VolumeFit {
         let mut notices = Vec::new();
         let part = |role: &str| inputs.model.parts.get(role);
         let template_part = part("template")
-            .ok_or_else(|| invalid("the model has no `template`; give it a file or a generator".to_string()))?;
+            .ok_or_else(|| Failure::invalid("the model has no `template`; give it a file or a generator"))?;
         let (template, target) = match part("target") {
             Some(part) => {
                 let target = target::read(part)?;
@@ -103,8 +103,8 @@ impl Method for VolumeFit {
             }
             None => {
                 let template = template::read(template_part, None, &mut notices)?;
-                let topology = template.mesh.topology().map_err(invalid)?;
-                let target = target::of_boundary(template.boundary(&topology).map_err(invalid)?);
+                let topology = template.mesh.topology().map_err(Failure::invalid)?;
+                let target = target::of_boundary(template.boundary(&topology).map_err(Failure::invalid)?);
                 (template, target)
             }
         };
@@ -154,10 +154,3 @@ const TRACES: &[(&str, &str)] = &[
     ("order", "highest order of an element"),
     ("nodes", "number of nodes"),
 ];
-
-fn invalid(reason: String) -> Failure {
-    Failure {
-        kind: "invalid-input".to_string(),
-        reason,
-    }
-}

@@ -2,7 +2,7 @@
 
 use super::fit::Fit;
 use super::validity::Certificates;
-use super::{TRACES, distances, invalid, picture, quality, shell};
+use super::{TRACES, distances, picture, quality, shell};
 use crate::fem::space::Space;
 use crate::method::{Failure, Outcome, Traces};
 use crate::optimize::{Observer, StopReason};
@@ -73,8 +73,8 @@ impl Fit<'_> {
         set("nodes", self.space.nodes as f64);
         let highest = self.space.highest_order();
         let most = self.settings.adaptive.map_or(highest, |adaptive| adaptive.most);
-        let full =
-            Space::new(&self.volume, &self.topology, self.settings.basis, &vec![most; cells]).map_err(invalid)?;
+        let full = Space::new(&self.volume, &self.topology, self.settings.basis, &vec![most; cells])
+            .map_err(Failure::invalid)?;
         set("node_share", 100.0 * self.space.nodes as f64 / full.nodes as f64);
         set(
             "order_mean",

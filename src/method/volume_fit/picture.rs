@@ -1,6 +1,5 @@
 //! The picture of a fit: every element cut evenly into linear cells.
 
-use super::invalid;
 use crate::fem::lagrange::sampled;
 use crate::fem::space::Space;
 use crate::linalg::vector3::Columns;
@@ -29,7 +28,7 @@ pub fn picture(
         cuts -= 1;
     }
     let m = cuts;
-    let mesh = sampled(volume, space, references, x, &|_| m).map_err(invalid)?;
+    let mesh = sampled(volume, space, references, x, &|_| m).map_err(Failure::invalid)?;
     let parts = Shape::ALL.map(|shape| parts(shape, m));
     let mut hexahedra: Vec<[u32; 8]> = Vec::new();
     let mut prisms: Vec<[u32; 6]> = Vec::new();

@@ -3,7 +3,6 @@
 //! Means are taken over a thousand points spread evenly over the canonical cell, extremes over these and a lattice
 //! with the corners, edges and faces, where elements fail first.
 
-use super::invalid;
 use crate::fem::batches::{Batches, unit_reference};
 use crate::fem::quadrature::{CellQuadrature, Line, Rule, Scattered};
 use crate::fem::space::{Kind, Space};
@@ -157,7 +156,7 @@ fn figures(
     x: &[f64],
     points: &dyn Fn(Kind) -> CellQuadrature,
 ) -> Result<Vec<Figures>, Failure> {
-    let batches = Batches::new(space, references, points).map_err(invalid)?;
+    let batches = Batches::new(space, references, points).map_err(Failure::invalid)?;
     let frames = Shape::ALL.map(corner_frames);
     let processor = Processor::detect();
     let none = Figures {

@@ -8,9 +8,9 @@
 use super::fit::Fit;
 use super::objective::Parts;
 use super::preconditioner::{self, Model};
+use super::untangle;
 use super::untangle::{Quiet, Round, Softness, TANGLED, Turned, turn};
 use super::validity::Certificates;
-use super::{invalid, untangle};
 use crate::energy::mapping::Density;
 use crate::fem::batches::{Batches, reference_volume};
 use crate::fem::boundary::Boundary;
@@ -84,9 +84,9 @@ impl Patch {
                 .map(|corner| vertices.partition_point(|vertex| vertex < corner) as u32);
             mesh.push(shape, &local.collect::<Vec<_>>());
         }
-        let topology = mesh.topology().map_err(invalid)?;
+        let topology = mesh.topology().map_err(Failure::invalid)?;
         let orders: Vec<usize> = cells.iter().map(|&cell| fit.space.orders[cell]).collect();
-        let space = Space::new(&mesh, &topology, fit.settings.basis, &orders).map_err(invalid)?;
+        let space = Space::new(&mesh, &topology, fit.settings.basis, &orders).map_err(Failure::invalid)?;
         let mut inside = vec![true; fit.space.nodes];
         for (cell, _) in fit.space.cells.iter().zip(&chosen).filter(|(_, chosen)| !**chosen) {
             for (node, _) in cell.slots.iter().filter_map(|slot| slot.node()) {
@@ -118,8 +118,8 @@ impl Patch {
 
     fn volume_energy(&self, fit: &Fit<'_>, density: Density) -> Result<VolumeEnergy, Failure> {
         let quadrature = |kind: Kind| fit.quadrature(kind);
-        let batches = Batches::new(&self.space, &self.references, &quadrature).map_err(invalid)?;
-        VolumeEnergy::new(batches, density).map_err(invalid)
+        let batches = Batches::new(&self.space, &self.references, &quadrature).map_err(Failure::invalid)?;
+        VolumeEnergy::new(batches, density).map_err(Failure::invalid)
     }
 }
 
@@ -333,7 +333,7 @@ fn repair(fit: &mut Fit<'_>, seeds: &[usize], observer: &mut dyn Observer) -> Re
         anisotropy: 1.0,
     };
     let blocks = preconditioner::sample_blocks(&model);
-    let diagonal = preconditioner::diagonal(&model).map_err(invalid)?;
+    let diagonal = preconditioner::diagonal(&model).map_err(Failure::invalid)?;
     let inverse: Vec<f64> = (diagonal.iter().zip(&patch.free))
         .map(|(&value, &free)| if free { 1.0 / value.max(f64::MIN_POSITIVE) } else { 0.0 })
         .collect();

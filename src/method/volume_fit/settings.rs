@@ -70,10 +70,7 @@ pub struct Adaptive {
 }
 
 fn invalid(reason: String) -> Failure {
-    Failure {
-        kind: "invalid-input".to_string(),
-        reason: format!("settings of volume-fit: {reason}"),
-    }
+    Failure::invalid(format!("settings of volume-fit: {reason}"))
 }
 
 /// What the presets choose: field, best, paper.

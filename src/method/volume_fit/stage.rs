@@ -2,7 +2,6 @@
 
 use super::chart::Chart;
 use super::fit::Fit;
-use super::invalid;
 use super::objective::{FitObjective, Parts};
 use super::preconditioner::{Model, Preconditioner};
 use super::settings::Stage;
@@ -153,7 +152,7 @@ impl Fit<'_> {
                     surface: self.surface_factor(),
                     anisotropy: settings.anisotropy,
                 };
-                let made = Preconditioner::new(&model).map_err(invalid)?;
+                let made = Preconditioner::new(&model).map_err(Failure::invalid)?;
                 self.count("factorizations", 1);
                 Some(made)
             } else {

@@ -6,7 +6,6 @@
 
 use super::chart::Chart;
 use super::fit::{Fit, interrupted};
-use super::invalid;
 use super::settings::Stage;
 use crate::fem::batches::references_of_volume;
 use crate::fem::space::Space;
@@ -31,7 +30,7 @@ pub(super) fn run(
     ));
     let cells = fit.volume.iter().map(|(shape, _)| shape.corners()).sum::<usize>() << (3 * (levels - 1));
     if cells > MOST_CELLS {
-        return Err(invalid(format!(
+        return Err(Failure::invalid(format!(
             "{levels} levels of this template have {cells} hexahedra, more than {MOST_CELLS}; lower subdivision_levels"
         )));
     }
@@ -39,13 +38,13 @@ pub(super) fn run(
     place_vertices(fit);
     let mut outcome = (StopReason::Converged, String::new());
     for level in 0..levels {
-        let subdivided = subdivide(&fit.volume, &tagged).map_err(invalid)?;
+        let subdivided = subdivide(&fit.volume, &tagged).map_err(Failure::invalid)?;
         let mut control = fit.volume.points.as_flattened().to_vec();
         fit.volume = subdivided.mesh;
-        fit.topology = fit.volume.topology().map_err(invalid)?;
+        fit.topology = fit.volume.topology().map_err(Failure::invalid)?;
         fit.references = references_of_volume(fit.volume.iter().map(|cell| cell.0), fit.reference_volume);
         let orders = vec![1; fit.volume.cells()];
-        fit.space = Space::new(&fit.volume, &fit.topology, fit.settings.basis, &orders).map_err(invalid)?;
+        fit.space = Space::new(&fit.volume, &fit.topology, fit.settings.basis, &orders).map_err(Failure::invalid)?;
         fit.x = fit.space.linear(&fit.volume.points);
         tagged = subdivided.features;
         let chart = Chart::linear(subdivided.map);

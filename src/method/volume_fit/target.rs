@@ -23,13 +23,6 @@ pub struct Target {
     pub notices: Vec<String>,
 }
 
-fn invalid(reason: String) -> Failure {
-    Failure {
-        kind: "invalid-input".to_string(),
-        reason,
-    }
-}
-
 /// Triangles of a file's content, quads as two.
 fn triangles(content: &Content) -> TriangleMesh {
     let mut cells = content.triangles.clone();
@@ -66,14 +59,14 @@ pub fn read(part: &Part) -> Result<Target, Failure> {
                     cells: Vec::new(),
                 },
                 None => {
-                    let content = format::read(name, bytes).map_err(|error| invalid(error.to_string()))?;
+                    let content = format::read(name, bytes).map_err(|error| Failure::invalid(error.to_string()))?;
                     notices.extend(content.notices.iter().map(|notice| format!("target: {notice}")));
                     let surface = triangles(&content);
                     let solids = content.tetrahedra.len() + content.hexahedra.len() + content.prisms.len();
                     if surface.cells.is_empty() && solids > 0 {
-                        let (volume, found) = MixedMesh::from_content(&content).map_err(invalid)?;
+                        let (volume, found) = MixedMesh::from_content(&content).map_err(Failure::invalid)?;
                         notices.extend(found.into_iter().map(|notice| format!("target: {notice}")));
-                        let topology = volume.topology().map_err(invalid)?;
+                        let topology = volume.topology().map_err(Failure::invalid)?;
                         topology.boundary_triangles(&volume.points)
                     } else {
                         surface
@@ -91,14 +84,14 @@ pub fn read(part: &Part) -> Result<Target, Failure> {
         }
     };
     if clean.points.is_empty() {
-        return Err(invalid("the target has neither triangles nor points".to_string()));
+        return Err(Failure::invalid("the target has neither triangles nor points"));
     }
     if let Some(place) = clean
         .points
         .iter()
         .position(|point| !point.iter().all(|coordinate| coordinate.is_finite()))
     {
-        return Err(invalid(format!(
+        return Err(Failure::invalid(format!(
             "vertex {place} of the target is at {:?}; coordinates must be finite numbers",
             clean.points[place]
         )));
@@ -131,7 +124,7 @@ fn cloud(name: &str, bytes: &[u8]) -> Result<Option<Vec<[f64; 3]>>, Failure> {
     if !(name.ends_with(".xyz") || name.ends_with(".pts")) {
         return Ok(None);
     }
-    let text = std::str::from_utf8(bytes).map_err(|_| invalid(format!("{name}: not a text of points")))?;
+    let text = std::str::from_utf8(bytes).map_err(|_| Failure::invalid(format!("{name}: not a text of points")))?;
     let mut points = Vec::new();
     for (line, row) in text.lines().enumerate() {
         let row = row.trim();
@@ -146,7 +139,7 @@ fn cloud(name: &str, bytes: &[u8]) -> Result<Option<Vec<[f64; 3]>>, Failure> {
             // The first line may be a count.
             Ok(numbers) if numbers.len() == 1 && points.is_empty() => {}
             _ => {
-                return Err(invalid(format!(
+                return Err(Failure::invalid(format!(
                     "{name}:{}: a point needs three finite numbers, here is {row:?}",
                     line + 1
                 )));

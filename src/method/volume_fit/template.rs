@@ -16,10 +16,7 @@ use crate::method::model::Part;
 use serde_json::Value;
 
 fn invalid(reason: String) -> Failure {
-    Failure {
-        kind: "invalid-input".to_string(),
-        reason: format!("template: {reason}"),
-    }
+    Failure::invalid(format!("template: {reason}"))
 }
 
 /// Most cells of a generated template.

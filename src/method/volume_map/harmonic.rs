@@ -52,13 +52,9 @@ fn solve<const C: usize>(
     values: &mut [[f64; C]],
     stiffness: impl Fn(&[u32; 4]) -> Stiffness + Sync,
 ) -> Result<(), Failure> {
-    let failure = |reason: String| Failure {
-        kind: "invalid-input".to_string(),
-        reason,
-    };
     let free: Vec<bool> = on_boundary.iter().map(|&fixed| !fixed).collect();
     let pattern = BlockPattern::<1>::new(&source.points, &source.cells, &free)
-        .map_err(|error| failure(format!("the source mesh gives no linear system: {error}")))?;
+        .map_err(|error| Failure::invalid(format!("the source mesh gives no linear system: {error}")))?;
     let unknowns = pattern.dimension();
     if unknowns == 0 {
         return Ok(());
@@ -95,7 +91,7 @@ fn solve<const C: usize>(
     }
     let mut cholesky = BlockCholesky::new(pattern);
     cholesky.factorize(&matrix, 0.0).map_err(|error| {
-        failure(format!(
+        Failure::invalid(format!(
             "the interior has no harmonic extension ({error}); every part of the mesh needs a boundary and tetrahedra \
              of positive volume"
         ))

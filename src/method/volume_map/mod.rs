@@ -153,13 +153,8 @@ pub fn run(problem: &Problem, settings: &Settings, observer: &mut dyn Observer) 
 
     observer.phase("start");
     let mut positions = start::positions(problem, settings)?;
-    let mapping =
-        MappingEnergy::new(&problem.source, &problem.weights(settings.weighting), density, None).map_err(|error| {
-            Failure {
-                kind: "invalid-input".to_string(),
-                reason: format!("source mesh: {error}"),
-            }
-        })?;
+    let mapping = MappingEnergy::new(&problem.source, &problem.weights(settings.weighting), density, None)
+        .map_err(|error| Failure::invalid(format!("source mesh: {error}")))?;
     let mut determinants = vec![0.0; mapping.cells()];
     mapping.determinants(positions.as_flattened(), &mut determinants);
     let folded = determinants.iter().filter(|&&determinant| !(determinant > 0.0)).count();
@@ -215,13 +210,8 @@ pub fn run(problem: &Problem, settings: &Settings, observer: &mut dyn Observer) 
         // and long before that their derivatives are of no use.
         observer.phase("approach");
         let approach = Density::new(&Mips);
-        let mapping =
-            MappingEnergy::new(&problem.source, &problem.volume_weights(), approach, None).map_err(|error| {
-                Failure {
-                    kind: "invalid-input".to_string(),
-                    reason: format!("source mesh: {error}"),
-                }
-            })?;
+        let mapping = MappingEnergy::new(&problem.source, &problem.volume_weights(), approach, None)
+            .map_err(|error| Failure::invalid(format!("source mesh: {error}")))?;
         let free: Vec<bool> = problem.boundary.mask.iter().map(|&on_boundary| !on_boundary).collect();
         let vertices = &problem.boundary.vertices;
         let mut objective =

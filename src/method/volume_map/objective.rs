@@ -68,10 +68,8 @@ impl MapObjective {
         positions: &[[f64; 3]],
         hessian: Hessian,
     ) -> Result<MapObjective, Failure> {
-        let pattern = BlockPattern::new(&source.points, &source.cells, free).map_err(|error| Failure {
-            kind: "invalid-input".to_string(),
-            reason: format!("the source mesh gives no linear system: {error}"),
-        })?;
+        let pattern = BlockPattern::new(&source.points, &source.cells, free)
+            .map_err(|error| Failure::invalid(format!("the source mesh gives no linear system: {error}")))?;
         let parts = vec![0.0; pattern.parts_len()];
         let matrix = vec![0.0; pattern.values_len()];
         let folds = !mapping.density().is_barrier();

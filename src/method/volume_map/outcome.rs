@@ -40,10 +40,7 @@ pub fn measure(problem: &Problem, settings: &Settings, positions: &[[f64; 3]]) -
         cells: problem.source.cells.clone(),
     };
     let weights = problem.volume_weights();
-    let failure = |error: energy::mapping::InvalidRest| Failure {
-        kind: "invalid-input".to_string(),
-        reason: format!("source mesh: {error}"),
-    };
+    let failure = |error: energy::mapping::InvalidRest| Failure::invalid(format!("source mesh: {error}"));
     let mut mapping = MappingEnergy::new(&rest, &weights, Density::new(density), None).map_err(failure)?;
     let flat = positions.as_flattened();
     let cells = rest.cells.len();
@@ -55,10 +52,7 @@ pub fn measure(problem: &Problem, settings: &Settings, positions: &[[f64; 3]]) -
         &given,
         problem.ratio,
     )
-    .map_err(|error| Failure {
-        kind: "invalid-input".to_string(),
-        reason: format!("source mesh: {error}"),
-    })?;
+    .map_err(|error| Failure::invalid(format!("source mesh: {error}")))?;
     let determinants: Vec<f64> = measured
         .determinant
         .iter()

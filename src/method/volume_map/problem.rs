@@ -39,13 +39,6 @@ pub struct Problem {
     pub notices: Vec<String>,
 }
 
-fn invalid(reason: String) -> Failure {
-    Failure {
-        kind: "invalid-input".to_string(),
-        reason,
-    }
-}
-
 impl Problem {
     /// Reads or generates the model, checks it, splits what the settings ask for, and chooses the units.
     ///
@@ -56,14 +49,14 @@ impl Problem {
             model
                 .parts
                 .get(role)
-                .ok_or_else(|| invalid(format!("the model has no `{role}`; give it a file or a generator")))
+                .ok_or_else(|| Failure::invalid(format!("the model has no `{role}`; give it a file or a generator")))
         };
         let mut notices = Vec::new();
         let (mut source, natural) = read_source(part("mesh")?, &mut notices)?;
         let found: Vec<check::Problem> = check::tetrahedra(&mut source);
         for problem in found {
             match problem.severity {
-                Severity::Error => return Err(invalid(format!("mesh: {}", problem.message))),
+                Severity::Error => return Err(Failure::invalid(format!("mesh: {}", problem.message))),
                 Severity::Warning | Severity::Repaired => notices.push(format!("mesh: {}", problem.message)),
             }
         }
@@ -96,13 +89,13 @@ impl Problem {
         let volume = source.volume();
         let size = mesh::diagonal(&target.positions);
         if !(enclosed.abs() > 1e-12 * size.powi(3)) {
-            return Err(invalid(format!(
+            return Err(Failure::invalid(format!(
                 "the target encloses the volume {enclosed:e} in a box of diagonal {size:e}; it must be the image of a \
                  closed surface around a volume"
             )));
         }
         if enclosed < 0.0 {
-            return Err(invalid(format!(
+            return Err(Failure::invalid(format!(
                 "the target turns the boundary inside out: it encloses the volume {enclosed:e}; mirror it, for instance \
                  by negating one coordinate"
             )));
@@ -235,7 +228,7 @@ fn read_source(part: &Part, notices: &mut Vec<String>) -> Result<(TetrahedralMes
     match part {
         Part::Generated { generator, parameters } => {
             let generated = generate::generate(generator, parameters)
-                .map_err(|reason| invalid(format!("generator \"{generator}\" of the mesh: {reason}")))?;
+                .map_err(|reason| Failure::invalid(format!("generator \"{generator}\" of the mesh: {reason}")))?;
             Ok((generated.mesh, generated.natural))
         }
         Part::File {
@@ -255,16 +248,16 @@ fn read_source(part: &Part, notices: &mut Vec<String>) -> Result<(TetrahedralMes
 
 /// The tetrahedra of a mesh file; other cells are told in a notice.
 fn read_tetrahedra(name: &str, bytes: &[u8], notices: &mut Vec<String>) -> Result<TetrahedralMesh, Failure> {
-    let content = format::read(name, bytes).map_err(|error| invalid(error.to_string()))?;
+    let content = format::read(name, bytes).map_err(|error| Failure::invalid(error.to_string()))?;
     notices.extend(content.notices.iter().map(|notice| format!("{name}: {notice}")));
     let volumes = content.hexahedra.len() + content.prisms.len() + content.pyramids.len();
     if volumes > 0 {
-        return Err(invalid(format!(
+        return Err(Failure::invalid(format!(
             "{name}: the mesh has {volumes} hexahedra, prisms or pyramids; a map needs tetrahedra only, split them first"
         )));
     }
     if content.tetrahedra.is_empty() {
-        return Err(invalid(format!(
+        return Err(Failure::invalid(format!(
             "{name}: the mesh has no tetrahedra; a map needs a volume mesh"
         )));
     }
@@ -283,7 +276,7 @@ fn read_target(
 ) -> Result<Target, Failure> {
     match part {
         Part::Generated { generator, parameters } => target::shape(generator, parameters, source, boundary, natural)
-            .map_err(|reason| invalid(format!("shape \"{generator}\" of the target: {reason}"))),
+            .map_err(|reason| Failure::invalid(format!("shape \"{generator}\" of the target: {reason}"))),
         Part::File {
             name,
             bytes,
@@ -292,20 +285,20 @@ fn read_target(
             let scale = scale_of(parameters);
             if Format::of_content(bytes).or(Format::of_name(name)).is_none() {
                 let text = std::str::from_utf8(bytes).map_err(|error| {
-                    invalid(format!(
+                    Failure::invalid(format!(
                         "{name}: neither a mesh nor text (byte {} is no UTF-8); a list of targets has a line `index x y z` \
                          for every boundary vertex",
                         error.valid_up_to()
                     ))
                 })?;
                 return target::list::parse(text, boundary, scale)
-                    .map_err(|reason| invalid(format!("{name}: {reason}")));
+                    .map_err(|reason| Failure::invalid(format!("{name}: {reason}")));
             }
             let mut mesh = read_tetrahedra(name, bytes, notices)?;
             for point in &mut mesh.points {
                 *point = point.map(|coordinate| coordinate * scale);
             }
-            target::from_mesh(source, boundary, &mesh).map_err(|reason| invalid(format!("{name}: {reason}")))
+            target::from_mesh(source, boundary, &mesh).map_err(|reason| Failure::invalid(format!("{name}: {reason}")))
         }
     }
 }

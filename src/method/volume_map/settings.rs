@@ -207,10 +207,8 @@ impl Settings {
                 word => Value::String(word.to_string()),
             });
         }
-        serde_json::from_value(Value::Object(table)).map_err(|error| Failure {
-            kind: "invalid-input".to_string(),
-            reason: format!("settings of volume-map: {error}"),
-        })
+        serde_json::from_value(Value::Object(table))
+            .map_err(|error| Failure::invalid(format!("settings of volume-map: {error}")))
     }
 
     /// The energy of this name, or a failure that lists the known ones.
@@ -219,9 +217,8 @@ impl Settings {
             .iter()
             .copied()
             .find(|energy| energy.name() == self.energy)
-            .ok_or_else(|| Failure {
-                kind: "invalid-input".to_string(),
-                reason: format!(
+            .ok_or_else(|| {
+                Failure::invalid(format!(
                     "unknown energy \"{}\"; known are {}",
                     self.energy,
                     energy::energies()
@@ -229,7 +226,7 @@ impl Settings {
                         .map(|energy| energy.name())
                         .collect::<Vec<_>>()
                         .join(", ")
-                ),
+                ))
             })
     }
 

@@ -36,11 +36,12 @@ pub fn positions(problem: &Problem, settings: &Settings) -> Result<Vec<[f64; 3]>
                 .map(|&point| similarity.apply(point))
                 .collect()
         }
-        Start::TargetMesh => problem.interior.clone().ok_or_else(|| Failure {
-            kind: "invalid-input".to_string(),
-            reason: "start = \"target-mesh\" needs a target that places interior vertices too; give a mesh of the \
+        Start::TargetMesh => problem.interior.clone().ok_or_else(|| {
+            Failure::invalid(
+                "start = \"target-mesh\" needs a target that places interior vertices too; give a mesh of the \
                      same connectivity as target, or choose another start"
-                .to_string(),
+                    .to_string(),
+            )
         })?,
         Start::RandomInterior => {
             let mut positions = problem.targets.clone();

@@ -55,13 +55,8 @@ pub fn untangle(
         epsilon: 1.0,
         lambda: options.determinant_weight,
     };
-    let mapping =
-        MappingEnergy::new(&problem.source, &weights, Density::of(regularization), Some(&scales)).map_err(|error| {
-            Failure {
-                kind: "invalid-input".to_string(),
-                reason: format!("source mesh: {error}"),
-            }
-        })?;
+    let mapping = MappingEnergy::new(&problem.source, &weights, Density::of(regularization), Some(&scales))
+        .map_err(|error| Failure::invalid(format!("source mesh: {error}")))?;
     let free: Vec<bool> = problem.boundary.mask.iter().map(|&fixed| !fixed).collect();
     let mut objective = MapObjective::new(
         mapping,

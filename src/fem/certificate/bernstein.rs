@@ -1,10 +1,10 @@
 //! Conversions from values at points to Bernstein coefficients, and the parts that cells are cut into.
 //!
-//! On lattices the inverse of the collocation matrix is written down rather than computed, since the error of an LU
-//! factorization grows with the square of its norm. With barycentric coordinates l of a simplex the Lagrange function of
-//! the lattice point `a / n` is `prod_i (n l_i) (n l_i - 1) ... (n l_i - a_i + 1) / a_i!`; expanded by Stirling
-//! numbers s and raised to degree n, its Bernstein coefficient b is `prod_i b_i! / n! sum_k (n - |k|)! prod_i s(a_i,
-//! k_i) n^k_i / (a_i! (b_i - k_i)!)`. The sum cancels, hence twice the digits.
+//! The inverse of the collocation matrix is written down rather than computed, since the error of an LU factorization
+//! grows with the square of its norm. On lines nothing cancels. On lattices, with barycentric coordinates l of a
+//! simplex, the Lagrange function of the lattice point `a / n` is `prod_i (n l_i) (n l_i - 1) ... (n l_i - a_i + 1) /
+//! a_i!`; expanded by Stirling numbers s and raised to degree n, its Bernstein coefficient b is `prod_i b_i! / n! sum_k
+//! (n - |k|)! prod_i s(a_i, k_i) n^k_i / (a_i! (b_i - k_i)!)`. The sum cancels, hence twice the digits.
 
 use super::double_double::DoubleDouble;
 use nalgebra::DMatrix;
@@ -38,15 +38,25 @@ pub(super) fn line_conversion(degree: usize) -> (Vec<f64>, DMatrix<f64>) {
     let points: Vec<f64> = (0..count)
         .map(|k| 0.5 - 0.5 * ((2 * k + 1) as f64 * std::f64::consts::PI / (2 * count) as f64).cos())
         .collect();
-    let matrix = DMatrix::from_fn(count, count, |row, column| {
-        let x = points[row];
-        binomial(degree, column) * x.powi(column as i32) * (1.0 - x).powi((degree - column) as i32)
-    });
-    let inverse = matrix.try_inverse();
-    (
-        points,
-        inverse.expect("Bernstein polynomials are independent at these points"),
-    )
+    let mut matrix = DMatrix::zeros(count, count);
+    for (column, &x) in points.iter().enumerate() {
+        // The product of all `t - y` by factors of `t^i (1 - t)^(degree - i)`. The summands of each have one sign.
+        let mut product = vec![1.0];
+        let mut scale = 1.0;
+        for &y in points.iter().filter(|&&y| y != x) {
+            let mut next = vec![0.0; product.len() + 1];
+            for (i, &term) in product.iter().enumerate() {
+                next[i] -= y * term;
+                next[i + 1] += (1.0 - y) * term;
+            }
+            product = next;
+            scale *= x - y;
+        }
+        for (row, term) in product.into_iter().enumerate() {
+            matrix[(row, column)] = term / (scale * binomial(degree, row));
+        }
+    }
+    (points, matrix)
 }
 
 /// A lattice of the triangle.

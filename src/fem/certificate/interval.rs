@@ -83,7 +83,7 @@ impl Certifier {
                     largest = largest.max(value.abs());
                     out.push(value);
                 }
-                let error = error + rounding(norm) * size;
+                let error = error + rounding(degree + 1, norm) * size;
                 errors.push(error);
                 sizes.push(largest + error);
             }

@@ -69,9 +69,16 @@ pub struct Certifier {
     tetrahedron_functions: BTreeMap<usize, Converted>,
 }
 
-/// Relative error of a conversion whose inverse matrix has this norm.
-fn rounding(norm: f64) -> f64 {
-    1e-15 * norm
+/// Half a unit in the last place of 1.
+const UNIT: f64 = 0.5 * f64::EPSILON;
+
+/// Rounding of a determinant of a positive definite matrix at most, as a share of the product of its diagonal.
+const MARGIN: f64 = 1e-14;
+
+/// Relative error of a conversion from this many values whose matrix has this norm: half a unit for each term of a sum and
+/// a few for the entries and the values.
+fn rounding(terms: usize, norm: f64) -> f64 {
+    (terms + 30) as f64 * UNIT * norm
 }
 
 /// Products of a coefficient and a function that the proof for one cell may take.
@@ -218,7 +225,7 @@ impl Certifier {
             order
         } else {
             // Above, conversions round more than is gained; more cuts do the same.
-            (order + 3).clamp(6, 16)
+            (order + 3).clamp(6, 14)
         }
     }
 
@@ -302,7 +309,7 @@ fn prove(control: &[Columns<f64>], mean: &Columns<f64>, error: f64) -> Option<f6
             let [a, b, c, d, e, f] = upper_entries(entry);
             let minor = a * d - b * b;
             let whole = f * minor - a * e * e + 2.0 * b * c * e - c * c * d;
-            if !(a > 1e-14 && minor > 1e-14 && whole > 1e-14) {
+            if !(a > 0.0 && minor > MARGIN * a * d && whole > MARGIN * a * d * f) {
                 return None;
             }
             least = least.min(whole);

@@ -9,7 +9,7 @@
 //! matters is computed anew.
 
 use super::lattice::Lattice;
-use super::{Certifier, NEGATIVE, Verdict, determinant, frobenius, rough};
+use super::{Certifier, MARGIN, NEGATIVE, UNIT, Verdict, determinant, frobenius, rough};
 use crate::fem::space::Kind;
 use crate::linalg::lanes::{Lanes, Vector, WIDTH};
 use crate::linalg::processor::{Kernel, Processor};
@@ -24,9 +24,6 @@ const HALVES: usize = 4;
 
 /// Rounding that does not matter for the proof: a share of the control matrices.
 const PRECISE: f64 = 0.01;
-
-/// Half a unit in the last place of 1.
-const UNIT: f64 = 0.5 * f64::EPSILON;
 
 /// A factor of a cell with its place among the indices of the coefficients.
 struct Factor<'a> {
@@ -485,7 +482,8 @@ impl Kernel for Test<'_> {
                 rows[row][column] = V::constant(self.rows[row][column]);
             }
         }
-        let (delta, threshold, half) = (V::constant(self.delta), V::constant(1e-14), V::constant(0.5));
+        let (delta, margin, half) = (V::constant(self.delta), V::constant(MARGIN), V::constant(0.5));
+        let zero = V::constant(0.0);
         let mut least = V::constant(f64::INFINITY);
         for place in (0..self.stride).step_by(WIDTH) {
             let mut matrix = [[V::constant(0.0); 3]; 3];
@@ -520,7 +518,8 @@ impl Kernel for Test<'_> {
             let (a, d, f) = (a - delta, d - delta, f - delta);
             let minor = a * d - b * b;
             let whole = f * minor - a * e * e + (b + b) * c * e - c * c * d;
-            let good = threshold.less(a) & threshold.less(minor) & threshold.less(whole);
+            let diagonal = margin * a * d;
+            let good = zero.less(a) & diagonal.less(minor) & (diagonal * f).less(whole);
             if V::bits(good) != u8::MAX {
                 *self.holds = false;
             }

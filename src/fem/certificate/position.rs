@@ -1,10 +1,9 @@
 //! Bernstein coefficients of the position of a cell whose functions are polynomials.
 //!
 //! Lines, triangles and tetrahedra have conversions of their own; coefficients of products are contracted factor by
-//! factor. Guaranteed: a bound of the position's error. It covers the conversions' rounding by an estimate, for lines of the
-//! function that the coefficients stand for rather than of each coefficient.
+//! factor. Guaranteed: a bound of the position's error. It covers the conversions' rounding.
 
-use super::{Certifier, rounding};
+use super::{Certifier, UNIT, rounding};
 use crate::fem::space::Kind;
 use crate::linalg::vector3::{add, subtract, times};
 use crate::mesh::mixed::Shape;
@@ -23,7 +22,7 @@ impl Converted {
     pub(super) fn new(conversion: &DMatrix<f64>, norm: f64, functions: usize, values: &[f64]) -> Converted {
         let sampled = DMatrix::from_row_slice(conversion.ncols(), functions, values);
         let sizes = sampled.column_iter().map(|column| column.amax());
-        let errors = sizes.map(|size| rounding(norm) * size).collect();
+        let errors = sizes.map(|size| rounding(conversion.ncols(), norm) * size).collect();
         Converted {
             matrix: conversion * sampled,
             errors,
@@ -63,12 +62,17 @@ impl Certifier {
     /// level and a number, for hexahedra, on the whole cell for others.
     pub(super) fn positions(&self, kind: Kind, own: &[[f64; 3]], box_of: [(u32, u32); 3]) -> (Vec<f64>, f64) {
         let n = kind.order + 1;
+        let terms = match kind.shape {
+            Shape::Hexahedron => 3 * n,
+            Shape::Prism => own.len() / n + n,
+            Shape::Tetrahedron => own.len(),
+        };
         // Rounding in the sums, relative to the sizes of the terms.
-        const SUMS: f64 = 1e-14;
+        let sums = (terms + 10) as f64 * UNIT;
         let mut error = [0.0; 3];
         let mut term = |c: [f64; 3], size: f64, wrong: f64| {
             for (error, c) in error.iter_mut().zip(c) {
-                *error += c.abs() * (wrong + SUMS * size);
+                *error += c.abs() * (wrong + sums * size);
             }
         };
         let list: Vec<[f64; 3]> = match kind.shape {

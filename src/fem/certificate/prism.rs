@@ -95,7 +95,8 @@ impl Certifier {
                 }
             }
             let size = frobenius(&columns);
-            let error = rounding(norm) * size + self.prism_error(order, lasts, &corners, (level, index), coefficients);
+            let error =
+                rounding(m + t, norm) * size + self.prism_error(order, lasts, &corners, (level, index), coefficients);
             // Along the line, then over the triangle.
             let mut along = vec![[[0.0; 3]; 3]; t * m];
             for row in 0..m {

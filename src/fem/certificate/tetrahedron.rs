@@ -62,7 +62,7 @@ impl Certifier {
                     *column = add(*column, times(c.map(f64::abs), error));
                 }
             }
-            let error = rounding(conversion.norm) * frobenius(&columns) + frobenius(&wrong);
+            let error = rounding(t, conversion.norm) * frobenius(&columns) + frobenius(&wrong);
             match self.part(&mut control, error, inverse) {
                 Ok(least) => bound = bound.min(least),
                 Err(rough) if parts + stack.len() + 8 > most || level > 20 => {

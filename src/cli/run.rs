@@ -150,7 +150,9 @@ pub(super) struct Done {
 fn run(plan: &Plan, running: &Running, chosen: Option<Vec<usize>>, interrupt: &Interrupt) -> Result<Done, Exit> {
     let store = Store::new(running.results.join("store"));
     if !running.quiet {
-        say(&format!("{}: {} jobs", plan.experiment.title, plan.jobs.len()));
+        let jobs = plan.jobs.len();
+        let plural = if jobs == 1 { "" } else { "s" };
+        say(&format!("{}: {jobs} job{plural}", plan.experiment.title));
         plan.notices.iter().for_each(|notice| tell!("notice: {notice}"));
     }
     let options = Options {
@@ -173,7 +175,10 @@ fn run(plan: &Plan, running: &Running, chosen: Option<Vec<usize>>, interrupt: &I
         let skipped = |finished: &&Finished| finished.record.result.status == Status::Skipped;
         let kept = outcome.finished.len() - outcome.finished.iter().filter(skipped).count();
         let jobs = plan.jobs.len();
-        tell!("interrupted: {kept} of {jobs} jobs are finished and kept; the same command computes the other {left}");
+        tell!(
+            "interrupted: {kept} of {jobs} jobs are finished and kept; the same command computes the other {left}, \
+             `vargeo report` shows those finished"
+        );
         return Ok(Done {
             exit: Exit::Interrupted,
             rows: Vec::new(),
@@ -183,6 +188,9 @@ fn run(plan: &Plan, running: &Running, chosen: Option<Vec<usize>>, interrupt: &I
     let exit = verdict(plan, &outcome.finished);
     if !running.quiet {
         say(&summary(plan, &outcome.finished));
+        if running.force && outcome.warnings.is_empty() {
+            say("no stored result differs from the one computed again\n");
+        }
     }
     let rows = rows(plan, &store, outcome.finished);
     let written = write_report(

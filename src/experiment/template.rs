@@ -295,12 +295,11 @@ fn sections(text: &mut String) {
 fn outputs(text: &mut String, method: &dyn Method, varied: Option<&str>) {
     let rows: Vec<String> = ["model"].into_iter().chain(varied).map(quote).collect();
     let metrics = method.metrics();
-    let columns: Vec<String> = metrics
-        .iter()
-        .take(5)
-        .map(|metric| quote(metric.name))
-        .chain([quote("seconds")])
-        .collect();
+    let headline: Vec<&str> = match method.headline() {
+        [] => metrics.iter().take(5).map(|metric| metric.name).collect(),
+        headline => headline.to_vec(),
+    };
+    let columns: Vec<String> = headline.into_iter().chain(["seconds"]).map(quote).collect();
     comment(
         text,
         "A table of the report: axes that head the rows, metrics as columns; `vargeo list metrics` defines each.",
@@ -311,7 +310,9 @@ fn outputs(text: &mut String, method: &dyn Method, varied: Option<&str>) {
         rows.join(", "),
         columns.join(", ")
     );
-    if let [(x, _), (y, _), ..] = method.traces() {
+    let traces = method.traces();
+    let energy = traces.iter().position(|(name, _)| *name == "energy").unwrap_or(1);
+    if let (Some((x, _)), Some((y, _))) = (traces.first(), traces.get(energy)) {
         comment(
             text,
             "A plot: a trace over another, or a metric over an axis; one line for each value of the series.",

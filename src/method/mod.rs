@@ -94,6 +94,10 @@ pub trait Method: Sync {
     }
     /// The metrics that every record of this method holds.
     fn metrics(&self) -> &'static [Metric];
+    /// Metrics that a first table shows; the first five when there are none.
+    fn headline(&self) -> &'static [&'static str] {
+        &[]
+    }
     /// Settings and axes across which values of this metric mean different things, such as energies of different
     /// densities: no table calls one of them the best.
     fn incomparable(&self, _metric: &str) -> &'static [&'static str] {

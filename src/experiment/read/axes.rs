@@ -190,11 +190,10 @@ pub fn read(
         used: models.iter().filter(is_listed).collect(),
         broken: broken_models,
     };
-    if model_axis.is_none() && !models.is_empty() {
-        let values = models
-            .iter()
-            .map(|model| Value::from(model.name.as_str()))
-            .collect::<Vec<_>>();
+    // Broken ones count too: otherwise whatever names the axis would seem wrong.
+    if model_axis.is_none() && !(models.is_empty() && broken_models.is_empty()) {
+        let names = models.iter().map(|model| &model.name).chain(broken_models);
+        let values: Vec<Value> = names.map(|name| Value::from(name.as_str())).collect();
         axes.vary.push(Axis {
             name: "model".to_owned(),
             values: values.clone(),

@@ -25,6 +25,7 @@ use super::model::ModelKind;
 use super::setting::Field;
 use super::{Failure, Inputs, Method, Outcome};
 use crate::mesh::catmull_clark::{limit, subdivide};
+use crate::mesh::format::{self, Content, Format};
 use crate::mesh::linear_map::LinearMap;
 use crate::mesh::surface::Surface;
 use crate::metric::Metric;
@@ -34,7 +35,7 @@ use objective::FitObjective;
 use problem::Problem;
 use serde_json::Value;
 use settings::{Settings, Stage};
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 use trace::{Recorder, Trace};
 
 /// The method `surface-fit`.
@@ -80,6 +81,16 @@ impl Method for SurfaceFit {
 
     fn metrics(&self) -> &'static [Metric] {
         metrics::all()
+    }
+
+    fn headline(&self) -> &'static [&'static str] {
+        &[
+            "hausdorff",
+            "distance_rms",
+            "scaled_jacobian_min",
+            "folded_faces",
+            "control_vertices",
+        ]
     }
 
     fn traces(&self) -> &'static [(&'static str, &'static str)] {
@@ -285,6 +296,14 @@ pub fn run(problem: &Problem, settings: &Settings, observer: &mut dyn Observer) 
     notices.extend(measured.notices);
     let mut metrics = measured.metrics;
     metrics.insert("control_vertices".to_string(), control.points.len() as f64);
+    let mut files = BTreeMap::new();
+    let exports = |name: &str| settings.export.iter().any(|export| export == name);
+    if exports("obj") {
+        files.insert("fit.obj".to_string(), obj(problem, &fitted)?);
+    }
+    if exports("control") && settings.subdivisions > 0 {
+        files.insert("control.obj".to_string(), obj(problem, &control)?);
+    }
     let stop = match serde_json::to_value(stop) {
         Ok(Value::String(word)) => word,
         _ => format!("{stop:?}").to_lowercase(),
@@ -303,6 +322,18 @@ pub fn run(problem: &Problem, settings: &Settings, observer: &mut dyn Observer) 
         .into(),
         notices,
         mesh: Some(measured.mesh),
-        files: Default::default(),
+        files,
     })
+}
+
+/// A surface as an OBJ file in the units of the target's file.
+fn obj(problem: &Problem, surface: &Surface) -> Result<Vec<u8>, Failure> {
+    let content = Content {
+        points: problem.to_given_units(&surface.points),
+        triangles: surface.triangles.clone(),
+        quads: surface.quads.clone(),
+        ..Content::default()
+    };
+    let written = format::write(Format::Obj, &content).map_err(Failure::invalid)?;
+    Ok(written.bytes)
 }

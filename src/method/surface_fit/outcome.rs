@@ -140,12 +140,16 @@ pub fn measure(
     set("template_euler", template_euler as f64);
 
     let mut notices = Vec::new();
-    if folded > 0 {
+    if let Some(first) = jacobians.iter().position(|&jacobian| !(jacobian > 0.0)) {
+        let [x, y, z] = problem.to_given_units(&[fitted.centre(first)])[0];
         notices.push(format!(
-            "{folded} of {} faces are folded (scaled Jacobian 0 or less); a larger `unfolding` or `evenness` unfolds \
-             them at some cost of distance",
+            "{folded} of {} faces are folded (scaled Jacobian 0 or less), the first at ({x:.4}, {y:.4}, {z:.4}); a larger \
+             `unfolding` or `evenness` may unfold them at some cost of distance, or more faces or another template",
             jacobians.len()
         ));
+    }
+    if problem.near && !closed {
+        notices.push("the target is open: voxels wrap it as if it were closed, and the fit cuts its rim".to_string());
     }
     if closed && !no_surface && target_euler != template_euler {
         notices.push(format!(

@@ -9,7 +9,7 @@ use crate::mesh::format;
 use crate::mesh::generate::shape::generate_shape;
 use crate::mesh::generate::template::generate_template;
 use crate::mesh::surface::Surface;
-use crate::mesh::{self, TriangleMesh};
+use crate::mesh::{self, TriangleMesh, length, subtract};
 use crate::method::Failure;
 use crate::method::model::{LoadedModel, Part};
 
@@ -73,6 +73,20 @@ impl Units {
     }
 }
 
+/// What to say of a template that lies elsewhere than its target or is of another size; the target's box has the
+/// diagonal 1 and its centre at the origin.
+fn far_off(template: &Surface) -> Option<String> {
+    let [low, high] = mesh::bounding_box(&template.points)?;
+    let centre: [f64; 3] = std::array::from_fn(|axis| 0.5 * (low[axis] + high[axis]));
+    let (size, away) = (length(subtract(high, low)), length(centre));
+    (!(0.25..=4.0).contains(&size) || away > 1.0).then(|| {
+        format!(
+            "template: its box is {size:.3e} times as large as the target's and {away:.3e} of its diagonals away from it; \
+             `place = \"box\"` puts it there"
+        )
+    })
+}
+
 impl Problem {
     /// Reads or generates the model.
     ///
@@ -114,8 +128,15 @@ impl Problem {
             Part::Generated { generator, parameters } if generator == VOXELS => {
                 near = true;
                 let quads = parameters.get("quads").and_then(|quads| quads.as_u64()).unwrap_or(384);
-                voxels::template(&target, quads as usize)
-                    .map_err(|message| Failure::invalid(format!("template: {message}")))?
+                let made = voxels::template(&target, quads as usize)
+                    .map_err(|message| Failure::invalid(format!("template: {message}")))?;
+                if made.faces().abs_diff(quads as usize) > quads as usize / 10 {
+                    notices.push(format!(
+                        "template: {} quadrilaterals where {quads} were asked for; grids come in steps",
+                        made.faces()
+                    ));
+                }
+                made
             }
             Part::Generated { generator, parameters } => generate_template(generator, parameters, [low, high])
                 .map_err(|message| Failure::invalid(format!("template: {message}")))?,
@@ -128,6 +149,8 @@ impl Problem {
                 units.scale(&mut template.points);
                 if parameters.get("place").and_then(|place| place.as_str()) == Some("box") {
                     stretch(&mut template, [low, high])?;
+                } else {
+                    notices.extend(far_off(&template));
                 }
                 template
             }
@@ -161,7 +184,7 @@ impl Problem {
         if target.cells.is_empty() {
             if target.points.len() < 4 {
                 return Err(Failure::invalid(format!(
-                    "target: {} points are no cloud to fit; give more points, or a surface",
+                    "target: {} points without faces are no cloud to fit; give more points, or a file with faces",
                     target.points.len()
                 )));
             }

@@ -8,6 +8,15 @@ use serde_json::{Map, Value};
 const NUMBERS: Kind = Kind::Number { min: 0.0, max: 1e12 };
 
 /// Everything that `[settings]` may hold.
+/// Files beside the pictures' mesh.
+const EXPORTS: &[(&str, &str)] = &[
+    (
+        "control",
+        "`control.obj`: the control mesh that was solved for, where it is subdivided",
+    ),
+    ("obj", "`fit.obj`: the fitted surface alone"),
+];
+
 pub static FIELDS: &[Field] = &[
     Field {
         name: "preset",
@@ -80,16 +89,17 @@ pub static FIELDS: &[Field] = &[
         kind: Kind::OneOf(&[NUMBERS, Kind::List(&NUMBERS)]),
         default: Default::Absent,
         doc: "Factor mu of |P L X|^2 with the projection P along the fit, whose normals are those at the start of the stage: \
-              spreads vertices evenly and keeps faces from folding without drawing the fit off the target. A number, or a \
-              list with one entry a stage. Preset best: [0, 0, 0.005], paper: 0.",
+              spreads vertices evenly and keeps faces from folding without drawing the fit off the target: a list with one \
+              entry a stage, or a number, which the preset's stages end with, or which holds in all stages where \
+              `anisotropy` or `regularization` is a list. Preset best: [0, 0, 0.005], paper: 0.",
     },
     Field {
         name: "unfolding",
         kind: NUMBERS,
         default: Default::Absent,
         doc: "Factor of a term on the corners of faces that are folded or nearly so, in stages of their own after the last: one \
-              where faces are folded then, and another with ten times the factor where some still are. 0 for none. Preset \
-              best: 10000, paper: 0.",
+              where faces are folded then, and another with ten times the factor where some still are; after that some may \
+              stay. 0 for none. Preset best: 10000, paper: 0.",
     },
     Field {
         name: "gradient",
@@ -220,6 +230,12 @@ pub static FIELDS: &[Field] = &[
         doc: "Edges of the target with a larger angle between its normals, in degrees, are the crease lines that the \
               crease metrics measure; changes no fit.",
     },
+    Field {
+        name: "export",
+        kind: Kind::List(&Kind::Choice(EXPORTS)),
+        default: Default::Absent,
+        doc: "Files beside the mesh that is pictured, which shows target and fit side by side. All when absent.",
+    },
 ];
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -307,6 +323,7 @@ pub struct Settings {
     pub preconditioner: Preconditioning,
     pub memory: usize,
     pub feature_angle: f64,
+    pub export: Vec<String>,
 }
 
 /// One minimization of a schedule.
@@ -362,12 +379,19 @@ impl Settings {
         };
         table.entry("approach").or_insert(Value::from(approach));
         if !paper && !listed(&table, "anisotropy") && !listed(&table, "regularization") {
-            for (name, schedule) in [("anisotropy", ANISOTROPY), ("regularization", REGULARIZATION)] {
+            let schedules = [
+                ("anisotropy", &ANISOTROPY[..]),
+                ("regularization", &REGULARIZATION[..]),
+                ("evenness", &EVENNESS[..]),
+            ];
+            for (name, schedule) in schedules {
                 if let Some(last) = table.get(name).and_then(Value::as_f64) {
-                    let rises = schedule[0] < schedule[schedule.len() - 1];
-                    let mut stages = schedule.map(|entry| if rises { entry.min(last) } else { entry.max(last) });
-                    stages[schedule.len() - 1] = last;
-                    table.insert(name.to_string(), Value::from(&stages[..]));
+                    let end = schedule.len() - 1;
+                    let rises = schedule[0] < schedule[end];
+                    let before = |&entry: &f64| if rises { entry.min(last) } else { entry.max(last) };
+                    let mut stages: Vec<f64> = schedule[..end].iter().map(before).collect();
+                    stages.push(last);
+                    table.insert(name.to_string(), Value::from(stages));
                 }
             }
         }
@@ -389,6 +413,8 @@ impl Settings {
         preset("unfolding", Value::from(UNFOLDING), Value::from(0.0));
         preset("limit", Value::from(true), Value::from(false));
         preset("preconditioner", Value::from("hessian"), Value::from("none"));
+        let all: Vec<&str> = EXPORTS.iter().map(|(name, _)| *name).collect();
+        table.entry("export").or_insert(Value::from(all));
         for name in SCHEDULES {
             if let Some(value) = table.get_mut(name)
                 && value.is_number()
@@ -396,8 +422,11 @@ impl Settings {
                 *value = Value::from(vec![value.clone()]);
             }
         }
-        let settings: Settings = serde_json::from_value(Value::Object(table))
+        let mut settings: Settings = serde_json::from_value(Value::Object(table))
             .map_err(|error| Failure::invalid(format!("settings of surface-fit: {error}")))?;
+        // Their order does not matter.
+        settings.export.sort();
+        settings.export.dedup();
         match empty_list(&settings) {
             Some(name) => Err(Failure::invalid(format!(
                 "settings of surface-fit: {name} is an empty list; give one value a stage"

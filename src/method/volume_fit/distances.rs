@@ -49,21 +49,24 @@ pub fn measure_boundary(
         let most = percent(distances.iter().copied().fold(0.0, f64::max));
         let square = distances.iter().map(|d| d * d).sum::<f64>() / distances.len() as f64;
         set("hausdorff", most);
-        set("hausdorff_from_target", most);
-        set("hausdorff_to_target", f64::NAN);
+        set("hausdorff_target_to_fit", most);
+        set("hausdorff_fit_to_target", f64::NAN);
         set("distance_rms", percent(square.sqrt()));
     } else {
         let measured = distance::hausdorff(&fitted, clean, stop).map_err(Failure::invalid)?;
         set("hausdorff", measured.percent(measured.max()));
-        set("hausdorff_to_target", measured.percent(measured.forward.max));
-        set("hausdorff_from_target", measured.percent(measured.backward.max));
-        set("distance_rms", measured.percent(measured.backward.rms));
+        set("hausdorff_fit_to_target", measured.percent(measured.forward.max));
+        set("hausdorff_target_to_fit", measured.percent(measured.backward.max));
+        set(
+            "distance_rms",
+            measured.percent(measured.forward.rms.max(measured.backward.rms)),
+        );
     }
     let crease = crease_distance(clean, &fitted, CREASE_ANGLE);
     let scale = 100.0 / mesh::diagonal(&clean.points);
-    let crease = crease.map_or([f64::NAN; 2], |crease| [scale * crease.mean, scale * crease.max]);
+    let crease = crease.map_or([f64::NAN; 2], |crease| [scale * crease.max, scale * crease.mean]);
     set("crease_distance", crease[0]);
-    set("crease_distance_max", crease[1]);
+    set("crease_distance_mean", crease[1]);
     let mut sum = 0.0;
     for line in &boundary.edges {
         let speeds: Vec<f64> = line

@@ -94,7 +94,7 @@ pub static ALL: &[Metric] = &[
         "Larger of the two one-sided distances between fitted boundary and target, in per cent of the diagonal of the target's box.",
     ),
     metric(
-        "hausdorff_to_target",
+        "hausdorff_fit_to_target",
         "d(S,T)",
         "%",
         Some(0.0),
@@ -102,7 +102,7 @@ pub static ALL: &[Metric] = &[
         "Largest distance of the fitted boundary to the target, in per cent of the diagonal.",
     ),
     metric(
-        "hausdorff_from_target",
+        "hausdorff_target_to_fit",
         "d(T,S)",
         "%",
         Some(0.0),
@@ -115,7 +115,8 @@ pub static ALL: &[Metric] = &[
         "%",
         Some(0.0),
         Better::Lower,
-        "Root mean square distance of the target to the fitted boundary, in per cent of the diagonal.",
+        "The larger of the root mean square distances both ways, in per cent of the diagonal; for a cloud that of the target to \
+         the fitted boundary.",
     ),
     metric(
         "crease_distance",
@@ -123,16 +124,16 @@ pub static ALL: &[Metric] = &[
         "%",
         Some(0.0),
         Better::Lower,
-        "Mean distance of the target's creases (edges bent by more than 40 degrees) to the fitted boundary, in per cent of the \
-         diagonal; not-a-number without creases.",
+        "Largest distance of the target's creases (edges bent by more than 40 degrees) to the fitted boundary, in per cent of \
+         the diagonal; not-a-number without creases.",
     ),
     metric(
-        "crease_distance_max",
-        "max d_crease",
+        "crease_distance_mean",
+        "mean d_crease",
         "%",
         Some(0.0),
         Better::Lower,
-        "Largest of these distances.",
+        "Mean of these distances over the length of the creases.",
     ),
     metric(
         "edge_uniformity",

@@ -77,8 +77,24 @@ impl Method for VolumeFit {
         settings::check(settings)
     }
 
+    fn canonical(&self, settings: Value) -> Value {
+        settings::canonical(&settings)
+    }
+
     fn metrics(&self) -> &'static [Metric] {
         metrics::ALL
+    }
+
+    fn headline(&self) -> &'static [&'static str] {
+        &[
+            "hausdorff",
+            "distance_rms",
+            "scaled_jacobian_mean",
+            "scaled_jacobian_min",
+            "inverted",
+            "certified",
+            "elements",
+        ]
     }
 
     fn traces(&self) -> &'static [(&'static str, &'static str)] {
@@ -117,11 +133,7 @@ impl Method for VolumeFit {
             ),
         ];
         for (_, kind, fields) in kinds.iter().filter(|kind| kind.0) {
-            let given: Vec<&str> = fields
-                .iter()
-                .copied()
-                .filter(|field| inputs.settings.get(field).is_some())
-                .collect();
+            let given = settings::given(inputs.settings, fields);
             if !given.is_empty() {
                 notices.push(format!("{} without effect on {kind}", given.join(", ")));
             }

@@ -6,7 +6,7 @@ use crate::fem::basis;
 use crate::fem::quadrature::{RULES, Rule};
 use crate::fem::space::HIGHEST_ORDER;
 use crate::method::Failure;
-use crate::method::setting::Default;
+use crate::method::setting::fill;
 use serde_json::Value;
 
 /// A stage.
@@ -74,11 +74,37 @@ fn invalid(reason: String) -> Failure {
 }
 
 /// What the presets choose: field, best, paper.
-const PRESETS: &[(&str, &str, &str)] = &[
-    ("basis", "integrated-legendre", "integrated-fourier"),
-    ("quadrature", "lobatto", "trapezoid"),
-    ("solver", "preconditioned-l-bfgs", "l-bfgs"),
-];
+fn presets() -> [(&'static str, Value, Value); 7] {
+    [
+        ("basis", "integrated-legendre".into(), "integrated-fourier".into()),
+        ("quadrature", "lobatto".into(), "trapezoid".into()),
+        ("solver", "preconditioned-l-bfgs".into(), "l-bfgs".into()),
+        ("lambda_far", 5.0.into(), 50.0.into()),
+        ("change_tolerance", 1e-5.into(), 0.0.into()),
+        ("coarse_tolerance", 0.0.into(), 0.0.into()),
+        ("repairs", 10.into(), 0.into()),
+    ]
+}
+
+/// The settings with what the preset chooses in its place, and without those that another switches off.
+pub fn canonical(settings: &Value) -> Value {
+    let mut table = fill(FIELDS, settings);
+    let paper = table.remove("preset").is_some_and(|preset| preset == "paper");
+    for (name, best, printed) in presets() {
+        table.entry(name).or_insert(if paper { printed } else { best });
+    }
+    if table.get("adaptive") == Some(&Value::from(false)) {
+        table.retain(|name, _| !name.starts_with("adaptive_"));
+    }
+    Value::Object(table)
+}
+
+/// Those of these fields that differ from what they are when the file leaves them open.
+pub fn given<'a>(settings: &Value, fields: &[&'a str]) -> Vec<&'a str> {
+    let [own, usual] = [settings, &Value::Null].map(canonical);
+    let differs = |field: &&&str| own.get(**field).is_some_and(|value| Some(value) != usual.get(**field));
+    fields.iter().filter(differs).copied().collect()
+}
 
 impl Settings {
     /// Reads validated settings.
@@ -86,59 +112,16 @@ impl Settings {
     /// # Errors
     /// A value that the declaration does not allow, or a schedule that lowers the order.
     pub fn resolve(settings: &Value) -> Result<Settings, Failure> {
-        let declared = |name: &str| {
-            FIELDS
-                .iter()
-                .find(|field| field.name == name)
-                .map(|field| &field.default)
-        };
-        let text = |name: &str| -> String {
-            let given = settings.get(name).and_then(Value::as_str);
-            match (given, declared(name)) {
-                (Some(word), _) => word.to_string(),
-                (None, Some(Default::Text(word))) => word.to_string(),
-                _ => String::new(),
-            }
-        };
-        let number = |name: &str| -> f64 {
-            let given = settings.get(name).and_then(Value::as_f64);
-            match (given, declared(name)) {
-                (Some(number), _) => number,
-                (None, Some(Default::Number(number))) => *number,
-                (None, Some(Default::Integer(number))) => *number as f64,
-                _ => 0.0,
-            }
-        };
-        let flag = |name: &str| -> bool {
-            let given = settings.get(name).and_then(Value::as_bool);
-            match (given, declared(name)) {
-                (Some(flag), _) => flag,
-                (None, Some(Default::Boolean(flag))) => *flag,
-                _ => false,
-            }
-        };
+        let settings = &canonical(settings);
+        let text = |name: &str| settings.get(name).and_then(Value::as_str).unwrap_or_default();
+        let number = |name: &str| settings.get(name).and_then(Value::as_f64).unwrap_or_default();
+        let flag = |name: &str| settings.get(name).and_then(Value::as_bool).unwrap_or_default();
+        // Absent where the word is "auto".
         let whole = |name: &str| settings.get(name).and_then(Value::as_u64).map(|value| value as usize);
-        let paper = text("preset") == "paper";
-        let chosen = |name: &str| -> String {
-            let word = text(name);
-            if !word.is_empty() {
-                return word;
-            }
-            let preset = PRESETS.iter().find(|preset| preset.0 == name);
-            preset.map_or(String::new(), |(_, best, printed)| {
-                (if paper { *printed } else { *best }).to_string()
-            })
-        };
-        let far = settings.get("lambda_far").and_then(Value::as_f64);
-        let far = far.unwrap_or(if paper { 50.0 } else { 5.0 });
         let order = number("order") as usize;
         let limit = number("iteration_limit") as u64;
-        let given = |name: &str, best: f64| {
-            let value = settings.get(name).and_then(Value::as_f64);
-            value.unwrap_or(if paper { 0.0 } else { best })
-        };
-        let tolerance = given("change_tolerance", 1e-5);
-        let coarse_tolerance = tolerance.max(given("coarse_tolerance", 0.0));
+        let tolerance = number("change_tolerance");
+        let coarse_tolerance = tolerance.max(number("coarse_tolerance"));
         let mut stages = Vec::new();
         match settings.get("schedule").and_then(Value::as_array) {
             Some(list) => {
@@ -159,8 +142,8 @@ impl Settings {
             None => {
                 stages = default_schedule(
                     order,
-                    &text("raise"),
-                    (far, number("far_steps") as usize),
+                    text("raise"),
+                    (number("lambda_far"), number("far_steps") as usize),
                     number("lambda"),
                     limit,
                     tolerance,
@@ -196,18 +179,18 @@ impl Settings {
                 stage.order
             )));
         }
-        let energy = energy::find(&text("energy")).filter(|energy| energy.is_barrier());
-        let basis = basis::find(&chosen("basis"));
-        let rule = RULES.iter().find(|rule| rule.0 == chosen("quadrature"));
+        let energy = energy::find(text("energy")).filter(|energy| energy.is_barrier());
+        let basis = basis::find(text("basis"));
+        let rule = RULES.iter().find(|rule| rule.0 == text("quadrature"));
         let (Some(energy), Some(basis), Some(rule)) = (energy, basis, rule) else {
             return Err(invalid(format!(
                 "energy {:?}, basis {:?} or quadrature {:?} is unknown; `vargeo list` names them",
                 text("energy"),
-                chosen("basis"),
-                chosen("quadrature")
+                text("basis"),
+                text("quadrature")
             )));
         };
-        let terms = match text("distance").as_str() {
+        let terms = match text("distance") {
             "to-target" => (true, false),
             "from-target" => (false, true),
             "none" => (false, false),
@@ -236,7 +219,7 @@ impl Settings {
                 to_target: terms.0,
                 from_target: terms.1,
             },
-            preconditioned: chosen("solver") == "preconditioned-l-bfgs",
+            preconditioned: text("solver") == "preconditioned-l-bfgs",
             memory: number("memory") as usize,
             refresh: number("refresh") as u64,
             gradient_tolerance: number("gradient_tolerance"),
@@ -248,7 +231,7 @@ impl Settings {
                 let words = names.iter().filter_map(Value::as_str).map(str::to_owned);
                 words.collect()
             }),
-            repairs: whole("repairs").unwrap_or(if paper { 0 } else { 10 }),
+            repairs: number("repairs") as usize,
         })
     }
 

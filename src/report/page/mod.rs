@@ -19,6 +19,7 @@ use crate::experiment::file::Experiment;
 use crate::experiment::job::JobPart;
 use crate::experiment::record::Status;
 use html::escape;
+use serde_json::{Map, Value};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 
@@ -475,17 +476,25 @@ fn provenance(experiment: &Experiment, rows: &[Row]) -> String {
         );
     }
     text.push_str("</dl>");
-    if experiment
-        .settings
-        .as_object()
-        .is_some_and(|settings| !settings.is_empty())
-    {
-        let settings = serde_json::to_string_pretty(&experiment.settings).unwrap_or_default();
+    let held = held(rows);
+    if !held.is_empty() {
+        let settings = serde_json::to_string_pretty(&held).unwrap_or_default();
         let _ = write!(
             text,
-            "<details><summary>Settings held for every job</summary><pre>{}</pre></details>",
+            "<details><summary>Settings that all jobs share, given, chosen by the preset or by default</summary>\
+             <pre>{}</pre></details>",
             escape(&settings)
         );
     }
     text
+}
+
+/// The settings that have one value in all jobs.
+fn held(rows: &[Row]) -> Map<String, Value> {
+    let mut all = rows.iter().filter_map(|row| row.record.job.settings.as_object());
+    let mut held = all.next().cloned().unwrap_or_default();
+    for settings in all {
+        held.retain(|name, value| settings.get(name) == Some(value));
+    }
+    held
 }

@@ -264,11 +264,13 @@ fn maximum_between_samples_is_found_and_certain() {
     let sampling = Sampling {
         spacing: 2.0,
         tolerance: 1e-4,
+        far: 1.0,
     };
     let distance = one_sided(&flat, &ClosestPoint::new(&cone), sampling, &never).unwrap();
     let finer = Sampling {
         spacing: 0.004,
         tolerance: 1e-5,
+        far: 1.0,
     };
     let reference = one_sided(&flat, &ClosestPoint::new(&cone), finer, &never).unwrap();
     assert!(distance.max <= reference.bound && reference.max <= distance.bound);
@@ -278,6 +280,28 @@ fn maximum_between_samples_is_found_and_certain() {
         distance.bound - distance.max
     );
     assert!((distance.max - reference.max).abs() < 2e-4);
+}
+
+#[test]
+fn the_area_that_is_far_does_not_depend_on_the_triangles() {
+    let quad = |points: Vec<[f64; 3]>| TriangleMesh {
+        points,
+        cells: vec![[0, 1, 2], [0, 2, 3]],
+    };
+    let ground = quad(vec![
+        [-9.0, -9.0, 0.0],
+        [9.0, -9.0, 0.0],
+        [9.0, 9.0, 0.0],
+        [-9.0, 9.0, 0.0],
+    ]);
+    let ramp = quad(vec![[0.0, 0.0, 0.0], [1.0, 0.0, 1.0], [1.0, 1.0, 1.0], [0.0, 1.0, 0.0]]);
+    let sampling = Sampling {
+        spacing: 0.01,
+        tolerance: 1e-4,
+        far: 0.4,
+    };
+    let distance = one_sided(&ramp, &ClosestPoint::new(&ground), sampling, &never).unwrap();
+    assert!((distance.far - 0.6).abs() < 5e-3, "{}", distance.far);
 }
 
 #[test]

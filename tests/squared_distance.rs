@@ -236,11 +236,11 @@ fn bumpy_torus(n: usize, m: usize) -> (Vec<[f64; 3]>, Vec<[u32; 3]>) {
 
 #[test]
 fn same_bits_for_any_number_of_threads() {
-    let (points, cells) = bumpy_torus(60, 30);
+    // More sites than are summed on one thread.
+    let (points, cells) = bumpy_torus(140, 70);
     let sites: Vec<[f64; 3]> = points
         .iter()
-        .step_by(3)
-        .zip(Noise(4).points(600))
+        .zip(Noise(4).points(9800))
         .map(|(x, d)| std::array::from_fn(|k| x[k] + 0.03 * d[k]))
         .collect();
     let normals: Vec<[f64; 3]> = Noise(6).points(sites.len()).into_iter().map(unit).collect();
@@ -335,4 +335,36 @@ fn values_beyond_measure() {
     let mut broken = points.clone();
     broken[3][1] = f64::NEG_INFINITY;
     assert_eq!(value(&broken, &points), f64::INFINITY);
+}
+
+/// A triangle is not lost beside the distance to its site.
+#[test]
+fn far_sites() {
+    let (points, cells) = bumpy_torus(12, 8);
+    let directions = [[1.0, 0.2, 0.1], [-0.3, 1.0, 0.2], [0.1, -0.4, -1.0]];
+    let mut term = SquaredDistance::new(&points, &cells).unwrap();
+    let area = {
+        let mut areas = vec![0.0; 1];
+        let wanted = Wanted {
+            areas: Some(&mut areas),
+            ..Wanted::default()
+        };
+        term.evaluate(&points, &PointTree::new(&points[..1]), &Options::default(), wanted);
+        areas[0]
+    };
+    for far in [1e4, 1e8, 1e12, 1e16, 1e40, 1e140] {
+        // Nearly all triangles lie in one cell, where the shorter formula holds.
+        let sites = directions.map(|direction| direction.map(|x| far * x));
+        let mut areas = vec![0.0; sites.len()];
+        let wanted = Wanted {
+            areas: Some(&mut areas),
+            ..Wanted::default()
+        };
+        let value = term.evaluate(&points, &PointTree::new(&sites), &Options::default(), wanted);
+        let sum: f64 = areas.iter().sum();
+        assert!((sum / area - 1.0).abs() < 1e-10, "{far}: {sum} of {area}");
+        let nearest = directions.iter().map(|d| d.iter().map(|x| x * x).sum::<f64>());
+        let least = nearest.fold(f64::INFINITY, f64::min) * far * far;
+        assert!((value / (area * least) - 1.0).abs() < 1e-3, "{far}: {value}");
+    }
 }

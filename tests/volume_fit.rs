@@ -11,7 +11,9 @@ use vargeo::mesh::TriangleMesh;
 use vargeo::mesh::format::Content;
 use vargeo::mesh::mixed::MixedMesh;
 use vargeo::mesh::template::{carve, collapse, extrude, grid, pillow, voxels};
-use vargeo::method::volume_fit::{VolumeFit, orientation};
+use vargeo::method::volume_fit::settings::Terms;
+use vargeo::method::volume_fit::surface_energy::{Scale, SurfaceEnergy};
+use vargeo::method::volume_fit::{VolumeFit, orientation, target};
 use vargeo::method::{Failure, Outcome};
 
 fn fit(template: Value, target: Option<Value>, settings: Value) -> Result<Outcome, Failure> {
@@ -54,6 +56,51 @@ fn a_fit_is_valid_falls_in_every_stage_and_is_the_same_with_any_number_of_thread
     let other = run(2);
     assert_eq!(outcome.mesh, other.mesh);
     assert_eq!(metric_bits(&outcome), metric_bits(&other));
+}
+
+/// A sphere within one that is larger by a share e: the terms come to `e^2 A` and `e^2 (1 + e)^2 A`, and `L = V / A` is a
+/// third of the radius, so `E = 9 e^2 (1 + (1 + e)^2)` whatever the anisotropy.
+#[test]
+fn the_surface_energy_of_concentric_spheres_and_its_gradient() {
+    let sphere = json!({ "a": 1.0, "b": 1.0, "c": 1.0, "triangles": 20_000 });
+    let mut target = target::read(&generated("ellipsoid", sphere)).unwrap();
+    target.place_sites();
+    let e = 0.05;
+    let larger = target.surface.points.iter().map(|point| point.map(|x| (1.0 + e) * x));
+    let samples: Vec<[f64; 3]> = larger.collect();
+    let scale = Scale::of(&target, true, &target.surface, 1.0);
+    let both = Terms {
+        to_target: true,
+        from_target: true,
+    };
+    let triangles = target.surface.cells.clone();
+    let energy = |s: f64| SurfaceEnergy::new(&samples, &triangles, &target, both, s, scale).unwrap();
+    for s in [1.0, 50.0] {
+        let mut energy = energy(s);
+        let mut gradient = vec![[0.0; 3]; samples.len()];
+        let value = energy.gradient(&samples, &mut gradient);
+        // Without normals what lies between the sites counts too.
+        let margin = if s == 1.0 { 0.2 } else { 0.01 };
+        let exact = 9.0 * e * e * (1.0 + (1.0 + e).powi(2));
+        assert!((value / exact - 1.0).abs() < margin, "{s}: {value} {exact}");
+        let direction = |index: usize| ((index * 7) as f64 * 0.37).sin();
+        let slope: f64 = gradient
+            .as_flattened()
+            .iter()
+            .enumerate()
+            .map(|(k, g)| g * direction(k))
+            .sum();
+        let mut at = |t: f64| {
+            let mut moved = samples.clone();
+            for (index, x) in moved.as_flattened_mut().iter_mut().enumerate() {
+                *x += t * direction(index);
+            }
+            energy.gradient(&moved, &mut vec![[0.0; 3]; moved.len()])
+        };
+        let step = 1e-6;
+        let difference = (at(step) - at(-step)) / (2.0 * step);
+        assert!((slope / difference - 1.0).abs() < 1e-4, "{s}: {slope} {difference}");
+    }
 }
 
 #[test]

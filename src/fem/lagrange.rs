@@ -19,10 +19,12 @@ pub struct Lagrange {
     pub mesh: CurvedMesh,
     /// Cells that are approximated only.
     pub approximated: usize,
+    /// Cells of a lower order than they need.
+    pub cut: usize,
 }
 
 /// Orders added to cells with functions that are no polynomials.
-const ADDED: usize = 4;
+const ADDED: usize = 6;
 
 /// The Lagrange form of a map with orders of at most `highest`.
 ///
@@ -36,23 +38,13 @@ pub fn lagrange(
     highest: usize,
 ) -> Result<Lagrange, String> {
     let polynomial = space.basis.is_polynomial();
-    let order = |kind: Kind| {
-        let linear = kind.order == 1;
-        let wanted = if polynomial || linear {
-            kind.order
-        } else {
-            kind.order + ADDED
-        };
-        wanted.min(highest)
-    };
-    let approximated = space
-        .cells
-        .iter()
-        .filter(|cell| cell.kind.order > 1 && (!polynomial || cell.kind.order > highest))
-        .count();
+    let is_exact = |kind: Kind| polynomial || kind.order == 1;
+    let needed = |kind: Kind| kind.order + if is_exact(kind) { 0 } else { ADDED };
+    let count = |test: &dyn Fn(Kind) -> bool| space.cells.iter().filter(|cell| test(cell.kind)).count();
     Ok(Lagrange {
-        mesh: sampled(volume, space, references, x, &order)?,
-        approximated,
+        mesh: sampled(volume, space, references, x, &|kind| needed(kind).min(highest))?,
+        approximated: count(&|kind| !is_exact(kind) || needed(kind) > highest),
+        cut: count(&|kind| needed(kind) > highest),
     })
 }
 

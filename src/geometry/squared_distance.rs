@@ -378,7 +378,8 @@ impl Normal {
 #[inline(always)]
 fn triangle(chunk: &mut Chunk, corners: &[[f64; 3]; 3], site: u32, position: [f64; 3], work: Work) {
     let [a, b, c] = corners.map(|corner| subtract(corner, position));
-    let across = cross(subtract(b, a), subtract(c, a));
+    // Not from differences to the site: they lose a triangle that is far away.
+    let across = cross(subtract(corners[1], corners[0]), subtract(corners[2], corners[0]));
     let area = 0.5 * dot(across, across).sqrt();
     if !(area > 0.0) {
         return;

@@ -376,6 +376,15 @@ impl MixedMesh {
     /// When a face belongs to three cells, two cells lie on the same side of a face, or the boundary is not closed.
     pub fn topology(&self) -> Result<Topology, String> {
         let cells = self.cells();
+        let mut sets: Vec<(Vec<u32>, usize)> = self.iter().map(|cell| cell.1.to_vec()).zip(0..).collect();
+        sets.iter_mut().for_each(|set| set.0.sort_unstable());
+        sets.sort_unstable();
+        if let Some(pair) = sets.windows(2).find(|pair| pair[0].0 == pair[1].0) {
+            return Err(format!(
+                "cells {} and {} have the same vertices {:?}; remove one",
+                pair[0].1, pair[1].1, pair[0].0
+            ));
+        }
         let mut edges = Vec::new();
         let mut faces = Vec::new();
         for (index, (shape, corners)) in self.iter().enumerate() {

@@ -79,6 +79,20 @@ pub fn bounding_box(points: &[[f64; 3]]) -> Option<[[f64; 3]; 2]> {
     }))
 }
 
+/// What to say of a template that lies elsewhere than its target or is of another size, in units in which the target's
+/// box has the diagonal 1 and its centre at the origin.
+pub fn far_off(template: &[[f64; 3]]) -> Option<String> {
+    let [low, high] = bounding_box(template)?;
+    let centre: [f64; 3] = std::array::from_fn(|axis| 0.5 * low[axis] + 0.5 * high[axis]);
+    let (size, away) = (length(subtract(high, low)), length(centre));
+    (!(0.25..=4.0).contains(&size) || away > 1.0).then(|| {
+        format!(
+            "template: its box is {size:.3e} times as large as the target's, its centre {away:.3e} of the target's diagonals \
+             away; `place = \"box\"` puts it there"
+        )
+    })
+}
+
 /// Length of the diagonal of the bounding box; zero without points.
 pub fn diagonal(points: &[[f64; 3]]) -> f64 {
     bounding_box(points).map_or(0.0, |[low, high]| length(subtract(high, low)))

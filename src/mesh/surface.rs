@@ -212,14 +212,14 @@ impl Surface {
 
     /// The scaled Jacobian of every face: over its corners the least of `n . (a x b) / (|a| |b|)` with the edges `a`, `b`
     /// at the corner and the face's unit normal; over the same of the regular triangle where it has three corners. 1 for
-    /// a rectangle and a regular triangle, negative where a face folds over, 0 without area.
+    /// a rectangle and a regular triangle, negative where a quadrilateral folds over, 0 without area or out of range.
     pub fn scaled_jacobians(&self) -> Vec<f64> {
         (0..self.faces())
             .map(|face| {
                 let corners = self.face(face);
                 let normal = self.face_vector(face);
                 let size = length(normal);
-                if !(size > 0.0) {
+                if !(size > 0.0 && size.is_finite()) {
                     return 0.0;
                 }
                 let count = corners.len();

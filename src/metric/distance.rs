@@ -84,18 +84,22 @@ const fn percent(name: &'static str, symbol: &'static str, definition: &'static 
 /// How finely distances are sampled; lengths in the units of the surfaces.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sampling {
-    /// Largest edge of a part, but for slivers and for surfaces that would have more than forty million samples.
+    /// Largest edge of a part, but for slivers, for triangles that would have more than 512 parts along an edge, and for
+    /// surfaces that would have more than forty million samples.
     pub spacing: f64,
     /// How far below the certain bound the maximum may stay.
     pub tolerance: f64,
+    /// Area at a larger distance than this is summed.
+    pub far: f64,
 }
 
 impl Sampling {
-    /// Parts of 0.1 % of the diagonal, and a maximum certain to half of that.
+    /// Parts of 0.1 % of the diagonal, and a maximum certain to half of that; beyond 2 % it is far.
     pub fn of_diagonal(diagonal: f64) -> Sampling {
         Sampling {
             spacing: 1e-3 * diagonal,
             tolerance: 5e-4 * diagonal,
+            far: 0.02 * diagonal,
         }
     }
 }
@@ -113,6 +117,8 @@ pub struct Distance {
     pub mean: f64,
     /// Root of the mean square over the area.
     pub rms: f64,
+    /// Share of the area that is far.
+    pub far: f64,
     /// The largest sample of every triangle.
     pub cells: Vec<f64>,
     pub samples: u64,
@@ -195,6 +201,7 @@ struct Sums {
     area: f64,
     first: f64,
     second: f64,
+    far: f64,
     samples: u64,
     max: f64,
     place: [f64; 3],
@@ -233,16 +240,17 @@ pub fn one_sided(
         sums.par_extend(
             (surface.cells[begin..end].par_chunks(CHUNK))
                 .zip(cells[begin..end].par_chunks_mut(CHUNK))
-                .map(|(triangles, largest)| sample(surface, triangles, to, spacing, largest)),
+                .map(|(triangles, largest)| sample(surface, triangles, to, (spacing, sampling.far), largest)),
         );
         begin = end;
     }
-    let (mut area, mut first, mut second, mut samples) = (0.0, 0.0, 0.0, 0);
+    let (mut area, mut first, mut second, mut far, mut samples) = (0.0, 0.0, 0.0, 0.0, 0);
     let (mut max, mut place) = (0.0, surface.corners(surface.cells[0])[0]);
     for sums in &sums {
         area += sums.area;
         first += sums.first;
         second += sums.second;
+        far += sums.far;
         samples += sums.samples;
         if sums.max > max {
             (max, place) = (sums.max, sums.place);
@@ -301,6 +309,7 @@ pub fn one_sided(
         place,
         mean: first / weight,
         rms: (second / weight).sqrt(),
+        far: far / weight,
         cells,
         samples,
     })
@@ -341,13 +350,14 @@ fn sample(
     surface: &TriangleMesh,
     triangles: &[[u32; 3]],
     to: &ClosestPoint,
-    spacing: f64,
+    (spacing, far): (f64, f64),
     largest: &mut [f64],
 ) -> Sums {
     let mut sums = Sums {
         area: 0.0,
         first: 0.0,
         second: 0.0,
+        far: 0.0,
         samples: 0,
         max: 0.0,
         place: surface.points[triangles[0][0] as usize],
@@ -389,19 +399,23 @@ fn sample(
         found.resize(points.len(), NOWHERE);
         to.nearest_each(&points, hint, &mut found);
         hint = found.last().map(|nearest| nearest.triangle);
-        let (mut one, mut two, mut most) = (0.0, 0.0, (0.0, 0));
+        let (mut one, mut two, mut beyond, mut most) = (0.0, 0.0, 0.0, (0.0, 0));
         for (index, nearest) in found.iter().enumerate() {
             if nearest.squared_distance > most.0 {
                 most = (nearest.squared_distance, index);
             }
             one += weights[index] * nearest.squared_distance.sqrt();
             two += weights[index] * nearest.squared_distance;
+            if nearest.squared_distance > far * far {
+                beyond += weights[index];
+            }
         }
         let area = length(area_vector(corners)) / 2.0;
         let weight = area * scale * scale;
         sums.area += area;
         sums.first += weight * one;
         sums.second += weight * two;
+        sums.far += weight * beyond;
         sums.samples += points.len() as u64;
         *largest = most.0.sqrt();
         if *largest > sums.max {

@@ -286,7 +286,7 @@ impl Certifier {
 fn prove(control: &[Columns<f64>], mean: &Columns<f64>, error: f64) -> Option<f64> {
     let cof = cofactor(mean);
     let middle = dot(mean[0], cof[0]);
-    if !(middle > 0.0) {
+    if !is_positive(middle, mean) {
         return None;
     }
     // J0^-1 by rows: row r is cof[r] / det.
@@ -317,6 +317,12 @@ fn prove(control: &[Columns<f64>], mean: &Columns<f64>, error: f64) -> Option<f6
         Some(middle * least)
     };
     least(true).or_else(|| least(false))
+}
+
+/// Whether a determinant is positive whatever its rounding, which Hadamard's inequality bounds.
+fn is_positive(determinant: f64, matrix: &Columns<f64>) -> bool {
+    let square: f64 = matrix.iter().map(|column| dot(*column, *column)).product();
+    determinant > MARGIN * square.sqrt()
 }
 
 /// `det (J0 + D) >= det J0 - (prod (|c_i| + |d_i|) - prod |c_i|)` over all those combinations, by Hadamard's inequality.

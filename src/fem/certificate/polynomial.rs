@@ -9,7 +9,7 @@
 //! matters is computed anew.
 
 use super::lattice::Lattice;
-use super::{Certifier, MARGIN, NEGATIVE, UNIT, Verdict, determinant, frobenius, rough};
+use super::{Certifier, MARGIN, NEGATIVE, UNIT, Verdict, determinant, frobenius, is_positive, rough};
 use crate::fem::space::Kind;
 use crate::linalg::lanes::{Lanes, Vector, WIDTH};
 use crate::linalg::processor::{Kernel, Processor};
@@ -221,8 +221,9 @@ impl Cell<'_> {
         let mean = self.mean();
         let cof = cofactor(&mean);
         let middle = dot(mean[0], cof[0]);
+        let usable = is_positive(middle, &mean);
         // Where the mean is of no use the identity still lets the edge to cut be chosen.
-        let rows = if middle > 0.0 {
+        let rows = if usable {
             cof.map(|row| times(row, 1.0 / middle))
         } else {
             let size = frobenius(&mean).max(f64::MIN_POSITIVE);
@@ -244,7 +245,7 @@ impl Cell<'_> {
                 least: &mut least,
                 holds: &mut holds,
             });
-            if middle > 0.0 && delta < 0.5 && holds {
+            if usable && delta < 0.5 && holds {
                 return Ok(middle * least);
             }
         }

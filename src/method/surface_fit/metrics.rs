@@ -29,7 +29,8 @@ const OWN: &[Metric] = &[
         "%",
         Some(0.0),
         Better::Lower,
-        "Share of the fit's area whose distance to the target exceeds 2 % of the diagonal of the target's box.",
+        "Share of the fit's area whose distance to the target exceeds 2 % of the diagonal of the target's box; not-a-number for a \
+         cloud.",
     ),
     metric(
         "missed_area",
@@ -37,7 +38,8 @@ const OWN: &[Metric] = &[
         "%",
         Some(0.0),
         Better::Lower,
-        "Share of the target's area whose distance to the fit exceeds 2 % of the diagonal of the target's box.",
+        "Share of the target's area, or of a cloud's points, whose distance to the fit exceeds 2 % of the diagonal of the \
+         target's box.",
     ),
     metric(
         "scaled_jacobian_min",
@@ -45,8 +47,9 @@ const OWN: &[Metric] = &[
         "",
         None,
         Better::Higher,
-        "Smallest scaled Jacobian of a face of the fit: over its corners the least of n . (a x b) / (|a| |b|), 1 for a \
-         rectangle, negative where it folds over.",
+        "Smallest scaled Jacobian of a face of the fit: over its corners the least of n . (a x b) / (|a| |b|), for \
+         triangles 2/sqrt(3) times that; 1 for a rectangle and a regular triangle, negative where a quadrilateral folds over. \
+         A triangle or a whole face turned over is not seen.",
     ),
     metric(
         "scaled_jacobian_mean",
@@ -88,7 +91,9 @@ const OWN: &[Metric] = &[
         "",
         Some(0.0),
         Better::Lower,
-        "The term from the target to the fit's vertices with the last stage's anisotropy, the target scaled to diagonal 1.",
+        "The term from the target to the fit's vertices with the last stage's anisotropy, the target scaled to diagonal 1; \
+         not-a-number where `terms` leave it out. Of a cloud: from its points to the fit, which together weigh as much as \
+         the template's area.",
     ),
     metric(
         "fit_to_target",
@@ -96,7 +101,8 @@ const OWN: &[Metric] = &[
         "",
         Some(0.0),
         Better::Lower,
-        "The term from the fit to the target's samples with the last stage's anisotropy, the target scaled to diagonal 1.",
+        "The term from the fit to the target's samples with the last stage's anisotropy, the target scaled to diagonal 1; \
+         not-a-number where `terms` leave it out.",
     ),
     metric(
         "regularizer",

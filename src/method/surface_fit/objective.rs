@@ -159,7 +159,6 @@ impl<'a> FitObjective<'a> {
             to_target: prepared("template", &fitted.points, &cells)?,
             from_target: prepared("target", &target.points, &target.cells)?,
             target,
-            cloud,
             samples,
             sample_tree: PointTree::new(&samples.points),
             site_tree: PointTree::new(&fitted.points),
@@ -172,7 +171,9 @@ impl<'a> FitObjective<'a> {
                 Gradient::Complete => Derivative::Complete,
                 Gradient::Paper => Derivative::Paper,
             },
-            compatibility: settings.compatibility,
+            // A cloud has no normals to be compatible with.
+            compatibility: if cloud.is_some() { 0.0 } else { settings.compatibility },
+            cloud,
             stage,
             latest: Rc::new(Cell::new(Parts::default())),
             points: vec![[0.0; 3]; count],

@@ -15,7 +15,7 @@ use crate::metric::crease::crease_distance;
 use crate::metric::distance::{self, Distance, Hausdorff};
 use std::collections::BTreeMap;
 
-/// Surface farther than this share of the diagonal is spurious, or missed.
+/// Points of a cloud farther than this share of the diagonal are missed.
 const FAR: f64 = 0.02;
 /// A fit that is worse than this share of the diagonal is called poor.
 const POOR: f64 = 0.03;
@@ -59,27 +59,8 @@ pub fn measure(
     set("hausdorff_target_to_fit", hausdorff.percent(backward.max));
     set("distance_mean", hausdorff.percent(forward.mean.max(backward.mean)));
     set("distance_rms", hausdorff.percent(forward.rms.max(backward.rms)));
-    let far = |surface: &TriangleMesh, distance: &Distance| {
-        let areas = surface.areas();
-        let beyond: f64 = areas
-            .iter()
-            .zip(&distance.cells)
-            .filter(|&(_, &distance)| distance > FAR * hausdorff.diagonal)
-            .map(|(area, _)| area)
-            .sum();
-        100.0 * beyond / areas.iter().sum::<f64>()
-    };
-    set("spurious_area", far(&triangulated, forward));
-    let missed = if no_surface {
-        let beyond = backward
-            .cells
-            .iter()
-            .filter(|&&distance| distance > FAR * hausdorff.diagonal);
-        100.0 * beyond.count() as f64 / target.points.len() as f64
-    } else {
-        far(target, backward)
-    };
-    set("missed_area", missed);
+    set("spurious_area", 100.0 * forward.far);
+    set("missed_area", 100.0 * backward.far);
     let crease = crease_distance(target, &triangulated, settings.feature_angle);
     let crease = crease.map_or([f64::NAN; 2], |crease| [crease.max, crease.mean]);
     set("crease_distance", hausdorff.percent(crease[0]));
@@ -96,8 +77,9 @@ pub fn measure(
         "scaled_jacobian_mean",
         jacobians.iter().sum::<f64>() / jacobians.len() as f64,
     );
-    set("target_to_fit", parts.from_target);
-    set("fit_to_target", parts.to_target);
+    let unless = |there: bool, value: f64| if there { value } else { f64::NAN };
+    set("target_to_fit", unless(settings.terms.from_target(), parts.from_target));
+    set("fit_to_target", unless(settings.terms.to_target(), parts.to_target));
     set("regularizer", parts.regularizer);
     set("unevenness", parts.unevenness);
     set(
@@ -162,8 +144,10 @@ pub fn measure(
             }
         ));
     }
-    if hausdorff.max() > POOR * hausdorff.diagonal {
-        let (way, farther) = if forward.max >= backward.max {
+    // Between the points of a cloud a fit is as far from them as they are from each other.
+    let worst = if no_surface { backward.max } else { hausdorff.max() };
+    if worst > POOR * hausdorff.diagonal {
+        let (way, farther) = if forward.max >= backward.max && !no_surface {
             ("a point of the fit is this far from the target", forward)
         } else {
             ("a point of the target is this far from the fit", backward)
@@ -183,6 +167,7 @@ pub fn measure(
 
 /// Distances to and from a cloud: of the fit's vertices to the nearest point, of every point to the fit.
 fn to_points(fit: &TriangleMesh, points: &[[f64; 3]]) -> Hausdorff {
+    let diagonal = mesh::diagonal(points);
     let summary = |distances: &[f64], places: &[[f64; 3]], cells: Vec<f64>| {
         let count = distances.len().max(1) as f64;
         let (mut max, mut place) = (0.0, places.first().copied().unwrap_or_default());
@@ -197,6 +182,7 @@ fn to_points(fit: &TriangleMesh, points: &[[f64; 3]]) -> Hausdorff {
             place,
             mean: distances.iter().sum::<f64>() / count,
             rms: (distances.iter().map(|x| x * x).sum::<f64>() / count).sqrt(),
+            far: distances.iter().filter(|&&x| x > FAR * diagonal).count() as f64 / count,
             cells,
             samples: distances.len() as u64,
         }
@@ -208,9 +194,12 @@ fn to_points(fit: &TriangleMesh, points: &[[f64; 3]]) -> Hausdorff {
     let cells = fit.cells.iter().map(corners).collect();
     let each = distance::of_points(points, &ClosestPoint::new(fit));
     Hausdorff {
-        forward: summary(&vertices, &fit.points, cells),
+        forward: Distance {
+            far: f64::NAN,
+            ..summary(&vertices, &fit.points, cells)
+        },
         backward: summary(&each, points, each.clone()),
-        diagonal: mesh::diagonal(points),
+        diagonal,
     }
 }
 

@@ -9,7 +9,7 @@ use crate::mesh::format;
 use crate::mesh::generate::shape::generate_shape;
 use crate::mesh::generate::template::generate_template;
 use crate::mesh::surface::Surface;
-use crate::mesh::{self, TriangleMesh, length, subtract};
+use crate::mesh::{self, TriangleMesh};
 use crate::method::Failure;
 use crate::method::model::{LoadedModel, Part};
 
@@ -71,20 +71,6 @@ impl Units {
         self.scale(&mut target.points);
         target
     }
-}
-
-/// What to say of a template that lies elsewhere than its target or is of another size; the target's box has the
-/// diagonal 1 and its centre at the origin.
-fn far_off(template: &Surface) -> Option<String> {
-    let [low, high] = mesh::bounding_box(&template.points)?;
-    let centre: [f64; 3] = std::array::from_fn(|axis| 0.5 * (low[axis] + high[axis]));
-    let (size, away) = (length(subtract(high, low)), length(centre));
-    (!(0.25..=4.0).contains(&size) || away > 1.0).then(|| {
-        format!(
-            "template: its box is {size:.3e} times as large as the target's and {away:.3e} of its diagonals away from it; \
-             `place = \"box\"` puts it there"
-        )
-    })
 }
 
 impl Problem {
@@ -150,7 +136,7 @@ impl Problem {
                 if parameters.get("place").and_then(|place| place.as_str()) == Some("box") {
                     stretch(&mut template, [low, high])?;
                 } else {
-                    notices.extend(far_off(&template));
+                    notices.extend(mesh::far_off(&template.points));
                 }
                 template
             }
@@ -189,7 +175,7 @@ impl Problem {
                 )));
             }
             notices.push(format!(
-                "target: a cloud of {} points without normals; the anisotropy has no effect",
+                "target: a cloud of {} points without normals; anisotropy and compatibility have no effect",
                 target.points.len()
             ));
         } else if !(area > 1e-14) {
@@ -229,7 +215,7 @@ impl Problem {
         });
         let points: Vec<[f64; 3]> = centres.collect();
         self.notices.push(format!(
-            "target: fitted as a cloud of {} points without normals; the anisotropy has no effect",
+            "target: fitted as a cloud of {} points without normals; anisotropy and compatibility have no effect",
             points.len()
         ));
         self.cloud = Some(points);

@@ -314,6 +314,9 @@ pub const WITHOUT_EFFECT_ON_SHELLS: &[&str] = &[
     "surface_samples",
     "repairs",
     "crease_angle",
+    "solver",
+    "refresh",
+    "untangle",
 ];
 
 /// What a subdivision volume does not read.

@@ -15,7 +15,7 @@ pub static FILES: &[(&str, &str)] = &[
     ),
     (
         "gmsh",
-        "`curved.msh`: Gmsh's complete elements of the elements' own order, 9 at most",
+        "`curved.msh`: Gmsh's complete elements of the elements' own order; not written where one needs more than 9",
     ),
     (
         "coefficients",
@@ -56,6 +56,10 @@ impl Fit<'_> {
                 }
                 "gmsh" => {
                     let form = self.form(x, gmsh::curved::HIGHEST_ORDER, "curved.msh")?;
+                    // Cut orders may turn valid elements inside out.
+                    if form.cut > 0 {
+                        continue;
+                    }
                     let bytes = gmsh::curved::write_curved(&form.mesh).map_err(Failure::invalid)?;
                     files.insert("curved.msh".to_string(), bytes);
                 }
@@ -70,11 +74,17 @@ impl Fit<'_> {
 
     fn form(&mut self, x: &[f64], highest: usize, file: &str) -> Result<Lagrange, Failure> {
         let form = lagrange(&self.volume, &self.space, &self.references, x, highest).map_err(Failure::invalid)?;
-        if form.approximated > 0 {
+        if form.cut > 0 && file == "curved.msh" {
             self.notices.push(format!(
-                "{file}: {} elements are interpolated, not exact: their functions are no polynomials, or their order is above \
-                 {highest}; the coefficient file is exact",
-                form.approximated
+                "{file} is not written: {} elements need orders above the format's {highest}; the coefficient file is exact",
+                form.cut
+            ));
+        } else if form.approximated > 0 {
+            self.notices.push(format!(
+                "{file}: {} elements are interpolated, since their functions are no polynomials{}: what is said of validity \
+                 holds for the coefficient file, which is exact",
+                form.approximated,
+                if form.cut > 0 { ", some with too few points" } else { "" }
             ));
         }
         Ok(form)

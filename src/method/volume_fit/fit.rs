@@ -88,6 +88,7 @@ impl<'a> Fit<'a> {
             [1.0 / unit; 3],
             middle.map(|coordinate| -coordinate / unit),
         );
+        notices.extend(mesh::far_off(&volume.points));
         if let Some(shell) = &mut shell {
             shell.distance /= unit;
             for column in shell.references.iter_mut().flatten() {

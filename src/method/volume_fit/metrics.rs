@@ -59,7 +59,7 @@ pub static ALL: &[Metric] = &[
         "",
         None,
         Better::Higher,
-        "Elements proved to have a positive determinant everywhere.",
+        "Elements proved to have a positive determinant everywhere: all of them where `inverted` and `undecided` are 0.",
     ),
     metric(
         "undecided",
@@ -91,7 +91,8 @@ pub static ALL: &[Metric] = &[
         "%",
         Some(0.0),
         Better::Lower,
-        "Larger of the two one-sided distances between fitted boundary and target, in per cent of the diagonal of the target's box.",
+        "Larger of the two one-sided distances between fitted boundary and target, in per cent of the diagonal of the target's \
+         box. The boundary is measured as triangles, with 12 pieces an edge or twice the order, if larger.",
     ),
     metric(
         "hausdorff_fit_to_target",
@@ -175,7 +176,8 @@ pub static ALL: &[Metric] = &[
         "",
         Some(0.0),
         Better::Lower,
-        "Surface energy plus lambda times volume energy at the end.",
+        "Surface energy plus lambda times volume energy at the end, at the fit's own quadrature points: it compares between jobs \
+         of one rule and one basis.",
     ),
     metric(
         "energy_surface",

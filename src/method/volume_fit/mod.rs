@@ -8,7 +8,8 @@
 //!
 //! Guaranteed: every accepted iterate has positive determinants at all quadrature points; within a stage the energy never
 //! rises; the same input gives the same bits with any number of threads. Not guaranteed: that elements are valid between
-//! the quadrature points, which the certificate in the outcome decides; that the boundary does not cut through itself.
+//! the quadrature points, which the certificate decides at the end and after each repair, not at every order on the way; that the
+//! boundary does not cut through itself.
 
 pub mod adaptivity;
 pub mod chart;
@@ -95,6 +96,14 @@ impl Method for VolumeFit {
             "certified",
             "elements",
         ]
+    }
+
+    fn incomparable(&self, metric: &str) -> &'static [&'static str] {
+        match metric {
+            "energy" | "energy_volume" => &["energy", "basis", "quadrature", "quadrature_points", "lambda", "model"],
+            "energy_surface" => &["anisotropy", "surface_samples", "distance", "model"],
+            _ => &[],
+        }
     }
 
     fn traces(&self) -> &'static [(&'static str, &'static str)] {

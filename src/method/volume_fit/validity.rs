@@ -103,7 +103,7 @@ impl Certificates {
         if let Some(bound) = open.reduce(f64::min) {
             notices.push(format!(
                 "elements stay undecided after as many cuts as they may take: no point of theirs with a determinant below \
-                 0 was found, and a proof only that it is at least {bound:.3e}"
+                 rounding was found, and a proof only that it is at least {bound:.3e}"
             ));
         }
         let first = self

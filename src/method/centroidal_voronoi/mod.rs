@@ -33,7 +33,7 @@ impl Method for CentroidalVoronoi {
     }
 
     fn version(&self) -> u32 {
-        3
+        4
     }
 
     fn summary(&self) -> &'static str {

@@ -238,7 +238,7 @@ o=vec4(mix(c*s,vec3(.05),k*wire),1.);}`));
     state.field = Math.max(0, same);
     $("field").replaceChildren(...shown.job.fields.map((name, i) => option(i, data.scales[name].label)));
     $("field").value = state.field;
-    $("shape").disabled = !shown.job.box;
+    $("shape").parentElement.style.display = shown.job.box ? "" : "none";
     $("cut").disabled = $("at").disabled = $("whole").disabled = shown.mesh.c !== 4;
     const bad = shown.inverted.reduce((a, b) => a + b, 0);
     const solid = shown.mesh.c === 4, kind = solid ? " cells" : " triangles";

@@ -174,7 +174,13 @@ pub fn build(experiment: &Experiment, table: &Table, rows: &[Row]) -> Grid {
     let mut notes = Notes::default();
     let mut body = Vec::new();
     let mut any_best = false;
-    let best = best_figures(experiment, &parts, &quantities, &name_of);
+    let is_contest = table.rows.last().is_some_and(|axis| axis != "model");
+    let best = if is_contest {
+        best_figures(experiment, &parts, &quantities, &name_of)
+    } else {
+        // One model is not better than another.
+        vec![vec![false; quantities.len()]; parts.len()]
+    };
     for (index, line) in lines.iter().enumerate() {
         let mut cells: Vec<Cell> = line
             .axes

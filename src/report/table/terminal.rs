@@ -36,7 +36,7 @@ pub fn write(grid: &Grid, width: Option<u16>) -> String {
         let _ = writeln!(text, "  [{}] {}", index + 1, plain(note));
     }
     if grid.body.iter().flatten().any(|cell| cell.best) {
-        text.push_str("  * best of its group\n");
+        text.push_str("  * best of those that differ in the last axis only\n");
     }
     text
 }

@@ -14,7 +14,7 @@ use vargeo::mesh::template::{carve, collapse, extrude, grid, pillow, voxels};
 use vargeo::method::volume_fit::settings::Terms;
 use vargeo::method::volume_fit::surface_energy::{Scale, SurfaceEnergy};
 use vargeo::method::volume_fit::{VolumeFit, orientation, target};
-use vargeo::method::{Failure, Outcome};
+use vargeo::method::{Failure, Method, Outcome};
 
 fn fit(template: Value, target: Option<Value>, settings: Value) -> Result<Outcome, Failure> {
     let part = |mut table: Value, key: &str| {
@@ -369,9 +369,18 @@ fn a_shell_takes_its_thickness_and_leaves_the_surface_where_it_is() {
     let outcome = fit(
         json!({ "generate": "shell", "distance": 4.0, "layers": 2, "side": "both" }),
         Some(json!({ "shape": "ellipsoid", "triangles": 200 })),
-        json!({ "order": 1, "iteration_limit": 300 }),
+        // As a file's settings are, with every default.
+        VolumeFit.canonical(json!({ "order": 1, "iteration_limit": 300 })),
     )
     .unwrap();
+    let ignored = |outcome: &Outcome| {
+        outcome
+            .notices
+            .iter()
+            .filter(|notice| notice.contains("without effect"))
+            .count()
+    };
+    assert_eq!(ignored(&outcome), 0, "{:?}", outcome.notices);
     let metric = |name: &str| outcome.metrics[name];
     assert_eq!(metric("prisms"), 4.0 * 192.0);
     assert_eq!(metric("inverted"), 0.0);
@@ -390,9 +399,10 @@ fn a_shell_takes_its_thickness_and_leaves_the_surface_where_it_is() {
     let plain = fit(
         json!({ "generate": "shell", "distance": 4.0, "layers": 2, "side": "both" }),
         Some(json!({ "shape": "ellipsoid", "triangles": 200 })),
-        json!({ "order": 1, "iteration_limit": 0 }),
+        json!({ "order": 1, "iteration_limit": 0, "anisotropy": 7.0 }),
     )
     .unwrap();
+    assert_eq!(ignored(&plain), 1);
     let start = coefficient_file::read(&plain.files["coefficients"]).unwrap();
     // 192 triangles of a closed surface have 98 vertices.
     assert_eq!(volume.mesh.points[..98], start.mesh.points[..98]);

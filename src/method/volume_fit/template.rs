@@ -46,7 +46,7 @@ pub fn read(part: &Part, target: Option<&Target>, notices: &mut Vec<String>) -> 
                 "voxels" => {
                     let Some(target) = target.filter(|target| !target.surface.cells.is_empty()) else {
                         return Err(invalid(
-                            "voxels need a target with triangles to lie within, not a cloud of points; generate a grid"
+                            "voxels need a target surface, with triangles, not a cloud; give one, or generate a grid"
                                 .to_string(),
                         ));
                     };

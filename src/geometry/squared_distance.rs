@@ -385,7 +385,7 @@ fn triangle(chunk: &mut Chunk, corners: &[[f64; 3]; 3], site: u32, position: [f6
         return;
     }
     let sum = add(add(a, b), c);
-    chunk.value += area / 12.0 * (dot(a, a) + dot(b, b) + dot(c, c) + dot(sum, sum));
+    chunk.value += area * (1.0 / 12.0) * (dot(a, a) + dot(b, b) + dot(c, c) + dot(sum, sum));
     if work.sums {
         let sums = chunk.sums(site);
         if work.sites {
@@ -406,20 +406,22 @@ fn piece(chunk: &mut Chunk, cut: &Cut<'_>, options: &Options<'_>, work: Work) {
     let first = cut.polygon[0];
     // Area, first and second moments about the first vertex, by the fan of triangles there.
     let (mut area, mut moment, mut second) = (0.0, [0.0; 2], [0.0; 3]);
-    for pair in cut.polygon[1..].windows(2) {
-        let b = [pair[0].u - first.u, pair[0].v - first.v];
-        let c = [pair[1].u - first.u, pair[1].v - first.v];
-        let part = 0.5 * (b[0] * c[1] - b[1] * c[0]);
+    let mut b = [cut.polygon[1].u - first.u, cut.polygon[1].v - first.v];
+    for corner in &cut.polygon[2..] {
+        let c = [corner.u - first.u, corner.v - first.v];
+        let doubled = b[0] * c[1] - b[1] * c[0];
         let sum = [b[0] + c[0], b[1] + c[1]];
-        area += part;
-        for k in 0..2 {
-            moment[k] += part / 3.0 * sum[k];
-        }
-        second[0] += part / 12.0 * (sum[0] * sum[0] + b[0] * b[0] + c[0] * c[0]);
-        second[1] += part / 12.0 * (sum[0] * sum[1] + b[0] * b[1] + c[0] * c[1]);
-        second[2] += part / 12.0 * (sum[1] * sum[1] + b[1] * b[1] + c[1] * c[1]);
+        area += doubled;
+        moment[0] += doubled * sum[0];
+        moment[1] += doubled * sum[1];
+        second[0] += doubled * (sum[0] * sum[0] + b[0] * b[0] + c[0] * c[0]);
+        second[1] += doubled * (sum[0] * sum[1] + b[0] * b[1] + c[0] * c[1]);
+        second[2] += doubled * (sum[1] * sum[1] + b[1] * b[1] + c[1] * c[1]);
+        b = c;
     }
-    let moment = [moment[0], moment[1], 0.0];
+    let area = 0.5 * area;
+    let moment = [moment[0] * (1.0 / 6.0), moment[1] * (1.0 / 6.0), 0.0];
+    let second = second.map(|x| x * (1.0 / 24.0));
     // Second moments times a vector.
     let spread = |x: [f64; 3]| {
         [

@@ -35,6 +35,15 @@ pub(crate) struct Corner {
     pub(super) rival: i32,
 }
 
+impl Corner {
+    pub(super) const EMPTY: Corner = Corner {
+        u: 0.0,
+        v: 0.0,
+        mark: 0,
+        rival: SETTLED,
+    };
+}
+
 /// A site that may own a part of the triangle.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Candidate {
@@ -174,7 +183,9 @@ fn value<V: Vector>(group: &[Lanes; 3], u: V, v: V) -> V {
 /// Convex polygons of one triangle in a flat array.
 #[derive(Debug, Default)]
 pub(super) struct Polygons {
+    /// The polygons' corners, and room for more.
     pub(super) corners: Vec<Corner>,
+    used: usize,
     /// Owner, first corner and end of every polygon.
     pub(super) parts: Vec<(u32, u32, u32)>,
     /// Sum of the polygons' areas.
@@ -183,16 +194,34 @@ pub(super) struct Polygons {
 
 impl Polygons {
     pub(super) fn clear(&mut self) {
-        self.corners.clear();
+        self.used = 0;
         self.parts.clear();
         self.area = 0.0;
     }
 
     #[inline(always)]
     pub(super) fn push(&mut self, owner: usize, polygon: &[Corner]) {
-        let start = self.corners.len() as u32;
-        self.corners.extend_from_slice(polygon);
-        self.parts.push((owner as u32, start, self.corners.len() as u32));
+        self.room(polygon.len())[..polygon.len()].copy_from_slice(polygon);
+        self.close(owner, 0, polygon.len());
+        self.used += polygon.len();
+    }
+
+    /// Room for so many corners, to write polygons to without a copy. What was there is of no use.
+    #[inline(always)]
+    pub(super) fn room(&mut self, size: usize) -> &mut [Corner] {
+        let end = self.used + size;
+        if self.corners.len() < end {
+            self.corners.resize(end, Corner::EMPTY);
+        }
+        &mut self.corners[self.used..end]
+    }
+
+    /// Makes a polygon of the corners from `start` to `end` in the room.
+    #[inline(always)]
+    pub(super) fn close(&mut self, owner: usize, start: usize, end: usize) {
+        let (start, end) = (self.used + start, self.used + end);
+        let polygon = &self.corners[start..end];
+        self.parts.push((owner as u32, start as u32, end as u32));
         let first = polygon[0];
         let mut doubled = 0.0;
         let (mut x, mut y) = (polygon[1].u - first.u, polygon[1].v - first.v);
@@ -209,8 +238,8 @@ impl Polygons {
     /// Adds a polygon that was cut among the functions `names`, and calls those by their names.
     pub(super) fn push_renamed(&mut self, owner: usize, polygon: &[Corner], names: &[u32]) {
         self.push(owner, polygon);
-        let start = self.corners.len() - polygon.len();
-        for corner in &mut self.corners[start..] {
+        let start = self.used - polygon.len();
+        for corner in &mut self.corners[start..self.used] {
             if corner.mark >= 0 {
                 corner.mark = names[corner.mark as usize] as i32;
             }

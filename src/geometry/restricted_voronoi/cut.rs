@@ -1,13 +1,15 @@
 //! One triangle among its sites: which of them may own a part of it, and the parts.
 //!
 //! There are three ways to the parts, each for what the one before leaves. All cells are walked at once along their edges
-//! ([`super::envelope`]). Where rounding breaks the walk, cells are cut one by one ([`super::clip`]). Where they then
-//! overlap or leave gaps, which their areas betray, they are cut by exact decisions ([`super::exact`]). Triangles with
-//! many candidates are not walked, and subdivided before they are cut ([`super::subdivide`]).
+//! ([`super::envelope`]), two or three in closed form ([`super::few`]). Where rounding breaks the walk, cells are cut one
+//! by one ([`super::clip`]). Where they then overlap or leave gaps, which their areas betray, they are cut by exact
+//! decisions ([`super::exact`]). Triangles with many candidates are not walked, and subdivided before they are cut
+//! ([`super::subdivide`]).
 
 use super::clip::{Candidate, Clipper, Corner, Heights, Polygons};
 use super::envelope::Envelope;
 use super::exact::{self, ExactClipper};
+use super::few::{divide_among_three, halve};
 use super::frame::Frame;
 use super::reach::Reach;
 use super::subdivide::Subdivision;
@@ -102,9 +104,13 @@ impl Cutter {
                 compatibility.weight * (1.0 - dot(normal, frame.normal)).max(0.0)
             })
         };
+        let compatible;
         let reach = match compatibility {
-            None => *reach,
-            Some(_) => Reach::new(reach.triangle, corners, reach.near, positions, offset),
+            None => reach,
+            Some(_) => {
+                compatible = Reach::new(reach.triangle, corners, reach.near, positions, offset);
+                &compatible
+            }
         };
         let reference = reach.reference;
         found.clear();
@@ -164,10 +170,25 @@ impl Cutter {
     /// Writes the polygons of two candidates or more. Differences of height functions below `tolerance` are rounding.
     #[inline(always)]
     fn divide<V: Vector>(&mut self, frame: &Frame, tolerance: f64, first: Way) {
-        self.take_heights();
         // Polygons that overlap or leave gaps betray themselves by their areas.
         let allowed = 1e-10 * frame.area + 1e-14 * frame.diameter * frame.diameter;
         let fills = |polygons: &Polygons| (polygons.area - frame.area).abs() <= allowed;
+        if first == Way::Walk {
+            let done = match &self.candidates[..] {
+                [a, b] => {
+                    halve(frame, [&a.height, &b.height], &mut self.polygons);
+                    true
+                }
+                [a, b, c] => divide_among_three(frame, [&a.height, &b.height, &c.height], &mut self.polygons),
+                _ => false,
+            };
+            if done && fills(&self.polygons) {
+                self.ways.walked += 1;
+                return;
+            }
+            self.polygons.clear();
+        }
+        self.take_heights();
         if first == Way::Walk && self.candidates.len() <= MANY {
             if self.envelope.cells::<V>(frame, &self.heights, &mut self.polygons) && fills(&self.polygons) {
                 self.ways.walked += 1;

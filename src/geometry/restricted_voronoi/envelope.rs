@@ -45,13 +45,8 @@ impl Envelope {
     /// written is then void.
     #[inline(always)]
     pub(super) fn cells<V: Vector>(&mut self, frame: &Frame, heights: &Heights, polygons: &mut Polygons) -> bool {
-        if heights.len() == 2 {
-            halve(frame, heights, polygons);
-            return true;
-        }
         // Cells that close, turn the right way and fill the triangle overlap nowhere.
-        let allowed = 1e-12 * frame.area + 1e-14 * frame.diameter * frame.diameter;
-        self.walk::<V>(frame, heights) && self.collect(heights.len(), polygons, allowed)
+        self.walk::<V>(frame, heights) && self.collect(heights.len(), polygons, allowed(frame))
     }
 
     #[inline(always)]
@@ -204,9 +199,15 @@ impl Envelope {
     }
 }
 
+/// By how much area a part of a cell may be turned over.
+#[inline(always)]
+pub(super) fn allowed(frame: &Frame) -> f64 {
+    1e-12 * frame.area + 1e-14 * frame.diameter * frame.diameter
+}
+
 /// Whether no triangle of the fan at the first vertex is turned over by more than the allowed area.
 #[inline(always)]
-fn counter_clockwise(polygon: &[Corner], allowed: f64) -> bool {
+pub(super) fn counter_clockwise(polygon: &[Corner], allowed: f64) -> bool {
     let first = polygon[0];
     let (mut x, mut y) = (polygon[1].u - first.u, polygon[1].v - first.v);
     let mut least = f64::INFINITY;
@@ -216,56 +217,4 @@ fn counter_clockwise(polygon: &[Corner], allowed: f64) -> bool {
         (x, y) = (a, b);
     }
     least >= -allowed
-}
-
-/// The cells of two functions.
-#[inline(always)]
-fn halve(frame: &Frame, heights: &Heights, polygons: &mut Polygons) {
-    let (a, b) = (heights.get(0), heights.get(1));
-    let difference = [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
-    let values = frame
-        .corners
-        .map(|[u, v]| difference[0] * u + difference[1] * v + difference[2]);
-    let owners = values.map(|value| usize::from(value > 0.0));
-    const EMPTY: Corner = Corner {
-        u: 0.0,
-        v: 0.0,
-        mark: 0,
-        rival: SETTLED,
-    };
-    let mut cells = [[EMPTY; 4]; 2];
-    let mut sizes = [0; 2];
-    for k in 0..3 {
-        let next = if k == 2 { 0 } else { k + 1 };
-        let (owner, other) = (owners[k], owners[next]);
-        let [u, v] = frame.corners[k];
-        let edge = -1 - k as i32;
-        cells[owner][sizes[owner]] = Corner {
-            u,
-            v,
-            mark: edge,
-            rival: SETTLED,
-        };
-        sizes[owner] += 1;
-        if owner != other {
-            let t = values[k] / (values[k] - values[next]);
-            let to = frame.corners[next];
-            let (u, v) = (u + t * (to[0] - u), v + t * (to[1] - v));
-            let mark = other as i32;
-            cells[owner][sizes[owner]] = Corner { u, v, mark, ..EMPTY };
-            cells[other][sizes[other]] = Corner {
-                u,
-                v,
-                mark: edge,
-                ..EMPTY
-            };
-            sizes[owner] += 1;
-            sizes[other] += 1;
-        }
-    }
-    for cell in 0..2 {
-        if sizes[cell] >= 3 {
-            polygons.push(cell, &cells[cell][..sizes[cell]]);
-        }
-    }
 }

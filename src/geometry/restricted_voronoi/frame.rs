@@ -28,19 +28,14 @@ impl Frame {
             dot(edges[1], edges[1]),
             dot(edges[2], edges[2]),
         ];
-        // The longest edge is the first axis.
-        let longest = if squares[0] >= squares[1] && squares[0] >= squares[2] {
-            0
-        } else if squares[1] >= squares[2] {
-            1
-        } else {
-            2
-        };
+        // The longest edge is the first axis. Found without branches: none could be foreseen.
+        let not_first = (squares[0] < squares[1]) | (squares[0] < squares[2]);
+        let longest = usize::from(not_first) * (1 + usize::from(squares[1] < squares[2]));
         let diameter = squares[longest].sqrt();
         let inverse = 1.0 / diameter;
         // Unit lengths before the product, so that no triangle is too small for it.
         let first = times(edges[longest], inverse);
-        let side = times(edges[if longest == 2 { 0 } else { longest + 1 }], inverse);
+        let side = times(edges[[1, 2, 0][longest]], inverse);
         let across = cross(first, side);
         let height = length(across);
         // A triangle without extent has no plane.

@@ -19,6 +19,7 @@ mod clip;
 mod cut;
 mod envelope;
 mod exact;
+mod few;
 mod frame;
 mod nearest;
 mod reach;
@@ -306,10 +307,7 @@ impl RestrictedVoronoi {
         }
         let processor = Processor::detect();
         // Only where a site is nearest to several vertices.
-        let block = match block(points.len(), sites.points().len()) {
-            block if block == BLOCK => block,
-            _ => 1,
-        };
+        let block = block(points.len(), sites.points().len());
         let mut ordered = std::mem::take(&mut self.ordered);
         let this = &*self;
         this.vertex_order

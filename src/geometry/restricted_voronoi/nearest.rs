@@ -54,16 +54,26 @@ impl Kernel for FindNearest<'_> {
             if vertices.len() == 1 {
                 continue;
             }
-            let position = self.sites.points()[first as usize];
-            let square = |vertex: u32| {
-                let difference = subtract(position, self.points[vertex as usize]);
-                dot(difference, difference)
+            // The better of the first vertex's site and the one that was nearest the last time.
+            let sites = self.sites.points();
+            let guess = |vertex: u32, before: u32| {
+                let square = |site: u32| {
+                    let difference = subtract(sites[site as usize], self.points[vertex as usize]);
+                    dot(difference, difference)
+                };
+                let guess = (square(first), first);
+                if (before as usize) < sites.len() {
+                    let other = (square(before), before);
+                    if other < guess { other } else { guess }
+                } else {
+                    guess
+                }
             };
             let mut around = Around::NOTHING;
             let mut bound = 0.0f64;
-            for &vertex in &vertices[1..] {
+            for (&vertex, &before) in vertices.iter().zip(&*found).skip(1) {
                 around.add(self.points[vertex as usize]);
-                bound = bound.max(square(vertex));
+                bound = bound.max(guess(vertex, before).0);
             }
             if self
                 .sites
@@ -72,7 +82,7 @@ impl Kernel for FindNearest<'_> {
                 for (&vertex, found) in vertices.iter().zip(found).skip(1) {
                     *found = self
                         .some
-                        .nearest::<V>(self.points[vertex as usize], (square(vertex), first))
+                        .nearest::<V>(self.points[vertex as usize], guess(vertex, *found))
                         .1;
                 }
             } else {

@@ -47,7 +47,7 @@ impl Method for SurfaceFit {
     }
 
     fn version(&self) -> u32 {
-        6
+        7
     }
 
     fn summary(&self) -> &'static str {

@@ -297,28 +297,45 @@ fn rigid_motions() {
             })
             .collect()
     };
-    let evaluate = |points: &[[f64; 3]], sites: &[[f64; 3]]| {
-        let mut term = SquaredDistance::new(points, &cells).expect("a valid surface");
-        let mut gradient = vec![[0.0; 3]; sites.len()];
-        let mut areas = vec![0.0; sites.len()];
-        let options = Options {
-            anisotropy: Anisotropy::Facets(50.0),
-            ..Options::default()
+    let normals: Vec<[f64; 3]> = sites
+        .iter()
+        .map(|&[x, y, z]| unit([z - x, x + 0.3, y * y - 1.0]))
+        .collect();
+    // With the normals of facets, as from a target to a fit, and with those of sites, as the other way.
+    for of_sites in [false, true] {
+        let evaluate = |points: &[[f64; 3]], sites: &[[f64; 3]], normals: &[[f64; 3]]| {
+            let mut term = SquaredDistance::new(points, &cells).expect("a valid surface");
+            let mut by_sites = vec![[0.0; 3]; sites.len()];
+            let mut by_surface = vec![[0.0; 3]; points.len()];
+            let mut areas = vec![0.0; sites.len()];
+            let options = Options {
+                anisotropy: if of_sites {
+                    Anisotropy::Sites(50.0, normals)
+                } else {
+                    Anisotropy::Facets(50.0)
+                },
+                compatibility: Some(Compatibility { weight: 0.1, normals }),
+                ..Options::default()
+            };
+            let wanted = Wanted {
+                sites: Some(&mut by_sites),
+                surface: Some(&mut by_surface),
+                areas: Some(&mut areas),
+                ..Wanted::default()
+            };
+            let value = term.evaluate(points, &PointTree::new(sites), &options, wanted);
+            (value, [by_sites, by_surface], areas.iter().sum::<f64>())
         };
-        let wanted = Wanted {
-            sites: Some(&mut gradient),
-            areas: Some(&mut areas),
-            ..Wanted::default()
-        };
-        let value = term.evaluate(points, &PointTree::new(sites), &options, wanted);
-        (value, gradient, areas.iter().sum::<f64>())
-    };
-    let (value, gradient, area) = evaluate(&points, &sites);
-    let (other, turned, same) = evaluate(&moved(&points), &moved(&sites));
-    assert!((value - other).abs() < 1e-12 * value, "{value} and {other}");
-    assert!((area - same).abs() < 1e-12 * area);
-    let expected: Vec<[f64; 3]> = gradient.iter().map(|&x| turn(x)).collect();
-    assert!(difference(&turned, &expected) < 1e-9 * norm(&gradient));
+        let turned_normals: Vec<[f64; 3]> = normals.iter().map(|&x| turn(x)).collect();
+        let (value, gradients, area) = evaluate(&points, &sites, &normals);
+        let (other, turned, same) = evaluate(&moved(&points), &moved(&sites), &turned_normals);
+        assert!((value - other).abs() < 1e-12 * value, "{value} and {other}");
+        assert!((area - same).abs() < 1e-12 * area);
+        for (gradient, turned) in gradients.iter().zip(&turned) {
+            let expected: Vec<[f64; 3]> = gradient.iter().map(|&x| turn(x)).collect();
+            assert!(difference(turned, &expected) < 1e-9 * norm(gradient));
+        }
+    }
 }
 
 /// Steps that leave the world behind: an infinite value, which a line search takes for too long a step.

@@ -10,7 +10,7 @@ use vargeo::mesh::surface::Surface;
 use vargeo::mesh::template::voxels;
 use vargeo::method::model::Part;
 use vargeo::method::surface_fit::objective::{FitObjective, Target};
-use vargeo::method::surface_fit::settings::{Settings, Stage};
+use vargeo::method::surface_fit::settings::{Preconditioning, Settings, Stage};
 use vargeo::method::surface_fit::{SurfaceFit, fitted_mesh, sampling};
 use vargeo::method::{Method, Outcome};
 use vargeo::optimize::{Objective, Silent};
@@ -102,6 +102,82 @@ fn box_becomes_an_ellipsoid() {
     for row in 1..energy.len() {
         assert!(stage[row] != stage[row - 1] || energy[row] <= energy[row - 1]);
     }
+}
+
+/// The error of the term from the fit to the target's samples falls as the square of their spacing (claim SF2): four times
+/// as many samples, a quarter of it. It is an energy of quantization, so it is positive.
+#[test]
+fn samples_approximate_to_second_order() {
+    let error = |samples: usize| {
+        let outcome = fit(
+            generated("ellipsoid", json!({ "triangles": 20_000 })),
+            generated("sphere", json!({ "quads": 1_536, "margin": 0.2 })),
+            json!({ "subdivisions": 0, "iteration_limit": 0, "sampling": "tessellation", "samples": samples }),
+        )
+        .unwrap();
+        outcome.metrics["approximation_error"]
+    };
+    let (coarse, fine) = (error(400), error(1_600));
+    assert!((3.6..4.6).contains(&(coarse / fine)), "{coarse:e} and {fine:e}");
+}
+
+/// The paper's preset is its one stage; what the file says goes before it. With its anisotropy the printed gradient is not
+/// the value's derivative, and without it is.
+#[test]
+fn paper_preset_and_printed_gradient() {
+    let paper = Settings::resolve(&json!({ "preset": "paper" })).unwrap();
+    let [stage] = &paper.stages()[..] else {
+        panic!("{:?}", paper.stages())
+    };
+    assert_eq!(
+        (stage.anisotropy, stage.regularization, stage.evenness, stage.unfolding),
+        (50.0, 2e-4, 0.0, 0.0)
+    );
+    assert_eq!((paper.preconditioner, paper.limit), (Preconditioning::None, false));
+    let own = Settings::resolve(&json!({ "preset": "paper", "evenness": 0.1 })).unwrap();
+    assert_eq!(own.stages()[0].evenness, 0.1);
+
+    let target = generate_shape("flower", &json!({ "triangles": 300, "petals": 3 })).unwrap();
+    let control = generate_template("box", &json!({ "quads": 24 }), [[-0.9; 3], [0.95; 3]]).unwrap();
+    for (anisotropy, same) in [(1.0, true), (50.0, false)] {
+        let [complete, printed] = ["complete", "paper"].map(|gradient| {
+            let settings = Settings::resolve(&json!({
+                "preset": "paper", "anisotropy": anisotropy, "gradient": gradient, "subdivisions": 0
+            }))
+            .unwrap();
+            let (fitted, map) = fitted_mesh(&control, &[], &settings);
+            let samples = sampling::sample(&target, fitted.points.len(), &settings, &mut Silent).unwrap();
+            let stage = settings.stages()[0];
+            let over = Target::Surface(&target);
+            let mut objective =
+                FitObjective::new(over, &samples, &fitted, &map, &control.points, &settings, stage).unwrap();
+            let x = control.points.as_flattened();
+            let mut gradient = vec![0.0; x.len()];
+            objective.gradient(x, &mut gradient);
+            gradient
+        });
+        let norm = |x: &mut dyn Iterator<Item = f64>| x.map(|x| x * x).sum::<f64>().sqrt();
+        let off = norm(&mut complete.iter().zip(&printed).map(|(a, b)| a - b)) / norm(&mut complete.iter().copied());
+        assert_eq!(off < 1e-12, same, "s = {anisotropy}: off by {off:e}");
+    }
+}
+
+/// A refined fit has four times the faces a round, lies nearer to its target, and its stages go on counting.
+#[test]
+fn refinement_brings_the_fit_nearer() {
+    let [plain, refined] = [0, 1].map(|refinements| {
+        fit(
+            generated("ellipsoid", json!({ "triangles": 3_000 })),
+            generated("box", json!({ "quads": 24 })),
+            json!({ "subdivisions": 1, "refinements": refinements, "iteration_limit": 40 }),
+        )
+        .unwrap()
+    });
+    assert_eq!(refined.metrics["faces"], 4.0 * plain.metrics["faces"]);
+    let [coarse, fine] = [&plain, &refined].map(|outcome| outcome.metrics["distance_rms"]);
+    assert!(fine < 0.5 * coarse, "{coarse} and {fine}");
+    let last = |outcome: &Outcome| outcome.traces["stage"].last().copied();
+    assert!(last(&refined) > last(&plain));
 }
 
 #[test]

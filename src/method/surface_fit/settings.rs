@@ -7,7 +7,6 @@ use serde_json::{Map, Value};
 
 const NUMBERS: Kind = Kind::Number { min: 0.0, max: 1e12 };
 
-/// Everything that `[settings]` may hold.
 /// Files beside the pictures' mesh.
 const EXPORTS: &[(&str, &str)] = &[
     (
@@ -17,6 +16,7 @@ const EXPORTS: &[(&str, &str)] = &[
     ("obj", "`fit.obj`: the fitted surface alone"),
 ];
 
+/// Everything that `[settings]` may hold.
 pub static FIELDS: &[Field] = &[
     Field {
         name: "preset",

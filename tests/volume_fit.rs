@@ -10,10 +10,12 @@ use vargeo::fem::space::Space;
 use vargeo::mesh::TriangleMesh;
 use vargeo::mesh::format::Content;
 use vargeo::mesh::mixed::MixedMesh;
+use vargeo::mesh::template::sweep::{Sweep, sweep};
 use vargeo::mesh::template::{carve, collapse, extrude, grid, pillow, voxels};
+use vargeo::method::model::Part;
 use vargeo::method::volume_fit::settings::Terms;
 use vargeo::method::volume_fit::surface_energy::{Scale, SurfaceEnergy};
-use vargeo::method::volume_fit::{VolumeFit, orientation, target};
+use vargeo::method::volume_fit::{VolumeFit, orientation, target, template};
 use vargeo::method::{Failure, Method, Outcome};
 
 fn fit(template: Value, target: Option<Value>, settings: Value) -> Result<Outcome, Failure> {
@@ -296,6 +298,95 @@ fn recipes_keep_meshes_valid() {
     let cubes = voxels::voxels(&surface, 2).unwrap();
     assert!(cubes.cells() > 2);
     assert_eq!(figures(&cubes).0, 2);
+}
+
+#[test]
+fn squares_swept_along_paths_join_and_close() {
+    let settings = Sweep {
+        width: 1.0,
+        step: 1.0,
+        bend: 1.0,
+        most: 10_000,
+    };
+    let flat = |path: &[[f64; 2]]| path.iter().map(|&[x, y]| [x, y, 0.0]).collect::<Vec<[f64; 3]>>();
+    // A bar of five cells, a corner of two, a bar of two more.
+    let hook = flat(&[[0.0, 0.0], [6.0, 0.0], [6.0, 3.0]]);
+    let mesh = sweep(std::slice::from_ref(&hook), settings).unwrap();
+    assert_eq!(mesh.cells(), 5 + 2 + 2);
+    assert_eq!(figures(&mesh).0, 2);
+    // Chords of the quarter circle enclose sin(45 degrees) of its length.
+    let bend = 2.0 * (std::f64::consts::FRAC_PI_4).sin();
+    assert!((figures(&mesh).1 - (7.0 + bend)).abs() < 1e-12, "{}", figures(&mesh).1);
+    // A closed frame with a stem on the side of one of its cells: a ring, in one piece.
+    let frame = flat(&[
+        [1.5, 0.0],
+        [2.5, 0.0],
+        [4.0, 0.0],
+        [4.0, 4.0],
+        [0.0, 4.0],
+        [0.0, 0.0],
+        [1.5, 0.0],
+    ]);
+    let stem = flat(&[[2.0, -0.5], [2.0, -3.5]]);
+    let joined = sweep(&[frame.clone(), stem], settings).unwrap();
+    assert_eq!(figures(&joined).0, 0);
+    let alone = sweep(&[frame], settings).unwrap();
+    assert_eq!(joined.points.len(), alone.points.len() + 12);
+    assert!((figures(&joined).1 - figures(&alone).1 - 3.0).abs() < 1e-9);
+    // A trefoil knot has torsion: its ends meet all the same, and it is a ring.
+    let knot: Vec<[f64; 3]> = (0..=60)
+        .map(|step| {
+            let t = std::f64::consts::TAU * (step % 60) as f64 / 60.0;
+            let point = [
+                t.sin() + 2.0 * (2.0 * t).sin(),
+                t.cos() - 2.0 * (2.0 * t).cos(),
+                -(3.0 * t).sin(),
+            ];
+            point.map(|coordinate| 3.0 * coordinate)
+        })
+        .collect();
+    let knot = sweep(&[knot], Sweep { bend: 0.0, ..settings }).unwrap();
+    assert_eq!((knot.cells(), knot.points.len()), (60, 240));
+    assert_eq!(figures(&knot).0, 0);
+    // What cannot be swept is named.
+    let refused = |path: &[[f64; 2]], settings: Sweep| sweep(&[flat(path)], settings).unwrap_err();
+    assert!(refused(&[[0.0, 0.0]], settings).contains("fewer than two points"));
+    assert!(refused(&[[0.0, 0.0], [0.0, 0.0]], settings).contains("points 0 and 1 are the same"));
+    assert!(refused(&[[0.0, 0.0], [2.0, 0.0], [0.0, 0.0]], settings).contains("turns back on itself at point 1"));
+    assert!(refused(&[[0.0, 0.0], [0.5, 0.0], [0.5, 4.0]], settings).contains("do not fit between points 0 and 1"));
+    let tight = Sweep { bend: 0.3, ..settings };
+    assert!(refused(&[[0.0, 0.0], [4.0, 0.0], [4.0, 4.0]], tight).contains("is turned over"));
+    let many = Sweep { step: 1e-9, ..settings };
+    assert!(refused(&[[0.0, 0.0], [4.0, 0.0]], many).contains("more than 10000 cells"));
+}
+
+/// Two squares and a triangle as a file: hexahedra and a prism.
+#[test]
+fn a_surface_file_is_extruded() {
+    let surface = b"v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 2 0 0\nv 2 1 0\nv 3 0 0\nf 1 2 3 4\nf 2 5 6 3\nf 5 7 6\n";
+    let read = |parameters: Value| {
+        let mut notices = Vec::new();
+        let part = Part::File {
+            name: "layout.obj".to_string(),
+            bytes: surface.to_vec(),
+            parameters,
+        };
+        template::read(&part, None, &mut notices)
+    };
+    let recipe = json!({ "recipe": [{ "op": "extrude", "distance": 2.0, "layers": 2 }, { "op": "pillow" }] });
+    let mesh = read(recipe).unwrap().mesh;
+    assert_eq!((mesh.hexahedra.len(), mesh.prisms.len()), (4 + 4 + 14, 2 + 2));
+    assert_eq!(figures(&mesh).0, 2);
+    assert!((figures(&mesh).1 - 5.0).abs() < 1e-12);
+    // Downwards, and only one of the squares.
+    let recipe = json!({ "recipe": [{ "op": "extrude", "distance": -1.0, "from": [1, 0, 0], "to": [2, 1, 0] }] });
+    let mesh = read(recipe).unwrap().mesh;
+    assert_eq!((mesh.hexahedra.len(), mesh.points.len()), (1, 8));
+    assert!((figures(&mesh).1 - 1.0).abs() < 1e-12);
+    let reason = |parameters: Value| read(parameters).err().unwrap().reason;
+    assert!(reason(json!({})).contains("let the recipe start with"));
+    let empty = json!({ "recipe": [{ "op": "extrude", "from": [9, 9, 9], "to": [10, 10, 10] }] });
+    assert!(reason(empty).contains("no triangle or quad has its centroid"));
 }
 
 #[test]

@@ -137,16 +137,33 @@ pub fn label(value: &Value) -> String {
             _ => number.to_string(),
         },
         Value::String(text) => text.clone(),
-        Value::Array(items) => items.iter().map(label).collect::<Vec<_>>().join(" "),
+        Value::Array(items) => items.iter().map(nested).collect::<Vec<_>>().join(" "),
         Value::Object(entries) => entries
             .iter()
             .map(|(key, value)| match value {
                 Value::Object(inner) if inner.is_empty() => key.clone(),
                 Value::Object(_) => format!("{key}({})", label(value)),
-                _ => format!("{key}={}", label(value)),
+                _ => format!("{key}={}", nested(value)),
             })
             .collect::<Vec<_>>()
             .join(" "),
+    }
+}
+
+/// A value within another: what has several parts stands in parentheses, a recipe's operation is called by its name.
+fn nested(value: &Value) -> String {
+    match value {
+        Value::Array(_) => format!("({})", label(value)),
+        Value::Object(entries) => {
+            let name = entries.get("op").map_or_else(String::new, label);
+            let mut rest = entries.clone();
+            rest.remove("op");
+            match (name.is_empty(), rest.is_empty()) {
+                (false, true) => name,
+                _ => format!("{name}({})", label(&Value::Object(rest))),
+            }
+        }
+        _ => label(value),
     }
 }
 

@@ -27,19 +27,40 @@ pub fn extrude(mesh: &MixedMesh, region: [[f64; 3]; 2], distance: f64, layers: u
     Ok(result)
 }
 
-/// A mesh of cells on a surface of triangles and quads, outward for a positive distance, inward for a negative one.
+/// Cells on the triangles and quads of a surface whose centroid lies in the box, outward for a positive distance, inward for
+/// a negative one.
 ///
 /// # Errors
-/// When the surface has no faces.
-pub fn thicken(points: &[[f64; 3]], faces: &[Vec<u32>], distance: f64, layers: usize) -> Result<MixedMesh, String> {
+/// When no face lies there, or one names a vertex that is not there.
+pub fn thicken(
+    points: &[[f64; 3]],
+    faces: &[Vec<u32>],
+    region: [[f64; 3]; 2],
+    distance: f64,
+    layers: usize,
+) -> Result<MixedMesh, String> {
+    if let Some(face) = faces
+        .iter()
+        .find(|face| face.iter().any(|&corner| corner as usize >= points.len()))
+    {
+        return Err(format!(
+            "the face {face:?} names a vertex that is not among the {}",
+            points.len()
+        ));
+    }
+    let inside = |face: &&Vec<u32>| within(centroid(points, face), region);
+    let faces: Vec<Vec<u32>> = faces.iter().filter(inside).cloned().collect();
     if faces.is_empty() {
-        return Err("there is no triangle or quad to extrude".to_string());
+        return Err(format!(
+            "no triangle or quad has its centroid between {:?} and {:?}, so there is nothing to extrude",
+            region[0], region[1]
+        ));
     }
     let mut result = MixedMesh {
         points: points.to_vec(),
         ..MixedMesh::default()
     };
-    stack(&mut result, faces, distance, layers);
+    stack(&mut result, &faces, distance, layers);
     result.drop_unused_points();
     Ok(result)
 }

@@ -1,4 +1,4 @@
-//! Templates for volumes: grids and voxels, and the operations that turn them into something close to a shape.
+//! Templates for volumes: grids, voxels and squares swept along paths, and the operations that turn them into something close to a shape.
 //!
 //! The operations are those that Jin et al. 2013 made their templates with by hand (section 4.1): carving, extrusion,
 //! pillowing and edge collapse. Every one leaves a mesh that [`MixedMesh::topology`](super::mixed::MixedMesh::topology)
@@ -10,6 +10,7 @@ pub mod carve;
 pub mod collapse;
 pub mod extrude;
 pub mod pillow;
+pub mod sweep;
 
 /// Whether a point lies in a box with faces included.
 fn within(point: [f64; 3], [low, high]: [[f64; 3]; 2]) -> bool {

@@ -6,9 +6,12 @@ use crate::method::model::{Generator, ModelKind, Role, fields, keep};
 use crate::method::setting::{Default, Field, Kind};
 use std::sync::LazyLock;
 
-const COORDINATE: Kind = Kind::Number { min: -1e9, max: 1e9 };
+static COORDINATE: Kind = Kind::Number { min: -1e9, max: 1e9 };
 
-/// One operation of a recipe.
+static POINT: Kind = Kind::List(&COORDINATE);
+static PATH: Kind = Kind::List(&POINT);
+
+/// One operation of a recipe. What an operation has no use for has no default, so that records hold what was given.
 static OPERATION: &[Field] = &[
     Field {
         name: "op",
@@ -21,7 +24,8 @@ static OPERATION: &[Field] = &[
             ("carve", "remove the cells whose centroid lies in the box"),
             (
                 "extrude",
-                "put layers of cells on the boundary faces whose centroid lies in the box",
+                "put layers of cells on the boundary faces whose centroid lies in the box; as a recipe's first operation also on the \
+                 faces of a surface file",
             ),
             (
                 "collapse",
@@ -46,26 +50,26 @@ static OPERATION: &[Field] = &[
     Field {
         name: "distance",
         kind: Kind::Number { min: -1e9, max: 1e9 },
-        default: Default::Number(1.0),
-        doc: "Height of an extrusion, all layers together.",
+        default: Default::Absent,
+        doc: "Height of an extrusion, all layers together; 1 when absent.",
     },
     Field {
         name: "layers",
         kind: Kind::Integer { min: 1, max: 1000 },
-        default: Default::Integer(1),
-        doc: "Layers of an extrusion.",
+        default: Default::Absent,
+        doc: "Layers of an extrusion; 1 when absent.",
     },
     Field {
         name: "thickness",
         kind: Kind::Number { min: 0.01, max: 0.99 },
-        default: Default::Number(0.4),
-        doc: "How far a pillow moves the old boundary towards its cells' middles, as a share.",
+        default: Default::Absent,
+        doc: "How far a pillow moves the old boundary towards its cells' middles, as a share; 0.4 when absent.",
     },
     Field {
         name: "axis",
         kind: Kind::Choice(&[("x", "edges along x"), ("y", "edges along y"), ("z", "edges along z")]),
-        default: Default::Text("x"),
-        doc: "Direction of the edges that are collapsed.",
+        default: Default::Absent,
+        doc: "Direction of the edges that are collapsed; x when absent.",
     },
 ];
 
@@ -76,7 +80,8 @@ static RECIPE: Field = Field {
     kind: Kind::List(&OPERATIONS),
     default: Default::Absent,
     doc: "Operations on the template, one after the other: `{ op = \"carve\", from = [1, 1, 0], to = [2, 2, 3] }` removes cells in \
-          a box, `{ op = \"extrude\", from, to, distance = 1.0, layers = 1 }` grows layers on boundary faces there, \
+          a box, `{ op = \"extrude\", from, to, distance = 1.0, layers = 1 }` grows layers on boundary faces there, or on a \
+          surface file's when it comes first, \
           `{ op = \"pillow\", thickness = 0.4 }` puts a layer of cells inside the whole boundary, `{ op = \"collapse\", axis = \"x\", \
           from, to }` collapses edges, which turns hexahedra into prisms and prisms into tetrahedra. Boxes are in the template's \
           own coordinates, where a grid's cells are unit cubes.",
@@ -196,6 +201,39 @@ static KIND: LazyLock<ModelKind> = LazyLock::new(|| {
                 doc: "Cubes on the longest side of the target's box.",
             }]),
             doc: "The cubes whose centres lie within the target, made a manifold.",
+        },
+        Generator {
+            name: "sweep",
+            parameters: with_recipe(vec![
+                Field {
+                    name: "paths",
+                    kind: Kind::List(&PATH),
+                    default: Default::Required,
+                    doc: "Paths of a square's centre, each a list of points, [x, y] or [x, y, z]. A path that ends where it starts is \
+                          closed. Points on straight parts are sections; a path that starts on the side of another's cell, \
+                          corner on corner, is joined to it.",
+                },
+                Field {
+                    name: "width",
+                    kind: Kind::Number { min: 1e-9, max: 1e9 },
+                    default: Default::Number(1.0),
+                    doc: "Side of the square.",
+                },
+                Field {
+                    name: "step",
+                    kind: Kind::Number { min: 1e-9, max: 1e9 },
+                    default: Default::Number(1.0),
+                    doc: "Wanted length of a cell along a path.",
+                },
+                Field {
+                    name: "bend",
+                    kind: Kind::Number { min: 0.0, max: 1e9 },
+                    default: Default::Number(1.0),
+                    doc: "Radius of the arcs that replace corners; with 0 the points are the sections, for paths given point by \
+                          point.",
+                },
+            ]),
+            doc: "Hexahedra swept along paths: rods, rings, knots and what they join to.",
         },
     ];
     templates.push(Generator {
@@ -321,7 +359,8 @@ static KIND: LazyLock<ModelKind> = LazyLock::new(|| {
                 file_parameters: with_recipe(vec![scale()]),
                 generator_key: "generate",
                 generators: keep(templates),
-                doc: "The volume of hexahedra, prisms and tetrahedra that is fitted.",
+                doc: "The volume of hexahedra, prisms and tetrahedra that is fitted; a file may hold a surface if its recipe starts with \
+                      `extrude`.",
             },
             Role {
                 name: "target",

@@ -1,6 +1,8 @@
 //! Generated targets: smooth or creased solids made of cubes, and spheres with bumps.
 
+use crate::mesh::mixed::MixedMesh;
 use crate::mesh::template::grid::selected;
+use crate::mesh::template::sweep::{Sweep, sweep};
 use crate::mesh::{self, TriangleMesh};
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -73,15 +75,17 @@ pub fn generate(name: &str, parameters: &Value, wanted: usize) -> TriangleMesh {
             surface
         }
         "hanger" => {
-            let part = |[i, j, _]: [usize; 3]| match j {
-                0 | 4 => true,
-                1..4 => i == 0 || i == 12,
-                5 => i == 6,
-                6 => (6..9).contains(&i),
-                7 => i == 8,
-                _ => (4..9).contains(&i),
-            };
-            quads_to_triangles(subdivided([13, 9, 1], part, wanted, true))
+            let paths = HANGER.map(|path| path.iter().map(|&[x, y]| [x, y, 0.0]).collect());
+            let volume = sweep(
+                &paths,
+                Sweep {
+                    width: 1.0,
+                    step: 1.0,
+                    bend: 1.0,
+                    most: usize::MAX,
+                },
+            );
+            quads_to_triangles(cut(volume.unwrap_or_default(), wanted, true))
         }
         "hand" => {
             let part = |[i, j, _]: [usize; 3]| {
@@ -130,6 +134,29 @@ pub fn generate(name: &str, parameters: &Value, wanted: usize) -> TriangleMesh {
     }
 }
 
+/// The frame of a clothes hanger, and its hook, which starts on the frame's highest cell.
+const HANGER: [&[[f64; 2]]; 2] = [
+    &[
+        [-0.5, 5.0],
+        [0.5, 5.0],
+        [1.5, 5.0],
+        [7.0, 2.0],
+        [7.0, 0.0],
+        [-7.0, 0.0],
+        [-7.0, 2.0],
+        [-1.5, 5.0],
+        [-0.5, 5.0],
+    ],
+    &[
+        [0.0, 5.5],
+        [0.0, 7.0],
+        [2.0, 7.0],
+        [2.0, 10.0],
+        [-1.0, 10.0],
+        [-1.0, 9.0],
+    ],
+];
+
 /// The cubes of a figure with legs, arms and a head.
 fn figure([i, _, k]: [usize; 3]) -> bool {
     match k {
@@ -159,14 +186,18 @@ fn subdivided(
     wanted: usize,
     smooth: bool,
 ) -> (Vec<[f64; 3]>, Vec<[u32; 4]>) {
-    let volume = selected(counts, part);
+    cut(selected(counts, part), wanted, smooth)
+}
+
+/// The same of any volume of hexahedra.
+fn cut(volume: MixedMesh, wanted: usize, smooth: bool) -> (Vec<[f64; 3]>, Vec<[u32; 4]>) {
     let faces = volume.topology().map(|topology| {
         let corners = topology.boundary().map(|(_, face)| face.corners);
         corners.collect::<Vec<[u32; 4]>>()
     });
     let mut quads = faces.unwrap_or_default();
     let mut points = volume.points;
-    while 2 * quads.len() * 2 <= wanted {
+    while !quads.is_empty() && 4 * quads.len() <= wanted {
         (points, quads) = split(&points, &quads);
         if smooth {
             average(&mut points, &quads);

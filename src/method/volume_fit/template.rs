@@ -7,9 +7,9 @@ use crate::fem::boundary::Boundary;
 use crate::fem::coefficient_file;
 use crate::fem::space::Space;
 use crate::mesh::TriangleMesh;
-use crate::mesh::format;
+use crate::mesh::format::{self, Content};
 use crate::mesh::mixed::{MixedMesh, Topology};
-use crate::mesh::template::{carve, collapse, extrude, grid, pillow, voxels};
+use crate::mesh::template::{carve, collapse, extrude, grid, pillow, sweep, voxels};
 use crate::mesh::{bounding_box, diagonal, generate};
 use crate::method::Failure;
 use crate::method::model::Part;
@@ -29,6 +29,8 @@ const MOST_CELLS: usize = 4_000_000;
 pub fn read(part: &Part, target: Option<&Target>, notices: &mut Vec<String>) -> Result<Template, Failure> {
     let mut map = None;
     let mut shell = None;
+    // Operations that making the mesh has used up.
+    let mut taken = 0;
     let (mut mesh, parameters, generated) = match part {
         Part::Generated { generator, parameters } => {
             let count =
@@ -52,6 +54,7 @@ pub fn read(part: &Part, target: Option<&Target>, notices: &mut Vec<String>) -> 
                     };
                     voxels::matching(&target.surface, count("along", 8)).map_err(invalid)?.0
                 }
+                "sweep" => swept(parameters).map_err(invalid)?,
                 "shell" => {
                     let Some(target) = target else {
                         return Err(invalid("a shell needs a target surface to grow on".to_string()));
@@ -109,7 +112,12 @@ pub fn read(part: &Part, target: Option<&Target>, notices: &mut Vec<String>) -> 
             } else {
                 let content = format::read(name, bytes).map_err(|error| invalid(error.to_string()))?;
                 notices.extend(content.notices.iter().map(|notice| format!("template: {notice}")));
-                let (mesh, found) = MixedMesh::from_content(&content).map_err(invalid)?;
+                let (mesh, found) = if is_surface(&content) {
+                    taken = 1;
+                    thickened(&content, parameters).map_err(invalid)?
+                } else {
+                    MixedMesh::from_content(&content).map_err(invalid)?
+                };
                 notices.extend(found.into_iter().map(|notice| format!("template: {notice}")));
                 mesh
             };
@@ -121,7 +129,7 @@ pub fn read(part: &Part, target: Option<&Target>, notices: &mut Vec<String>) -> 
         }
     };
     let recipe = parameters.get("recipe").and_then(Value::as_array);
-    for (step, operation) in recipe.into_iter().flatten().enumerate() {
+    for (step, operation) in recipe.into_iter().flatten().enumerate().skip(taken) {
         mesh = apply(&mesh, operation).map_err(|reason| invalid(format!("step {step} of the recipe: {reason}")))?;
     }
     mesh.topology().map_err(invalid)?;
@@ -136,6 +144,46 @@ pub fn read(part: &Part, target: Option<&Target>, notices: &mut Vec<String>) -> 
         .map_err(invalid)?;
     }
     Ok(Template { mesh, map, shell })
+}
+
+/// Hexahedra swept along the paths that are given.
+fn swept(parameters: &Value) -> Result<MixedMesh, String> {
+    let number = |name: &str| parameters.get(name).and_then(Value::as_f64).unwrap_or(1.0);
+    let mut paths = Vec::new();
+    for (index, path) in parameters
+        .get("paths")
+        .and_then(Value::as_array)
+        .into_iter()
+        .flatten()
+        .enumerate()
+    {
+        let mut points = Vec::new();
+        for (place, point) in path.as_array().into_iter().flatten().enumerate() {
+            let numbers: Vec<f64> = point
+                .as_array()
+                .into_iter()
+                .flatten()
+                .filter_map(Value::as_f64)
+                .collect();
+            points.push(match numbers[..] {
+                [x, y] => [x, y, 0.0],
+                [x, y, z] => [x, y, z],
+                _ => {
+                    return Err(format!(
+                        "path {index}: point {place} needs two or three numbers, [x, y] or [x, y, z]"
+                    ));
+                }
+            });
+        }
+        paths.push(points);
+    }
+    let sweep = sweep::Sweep {
+        width: number("width"),
+        step: number("step"),
+        bend: number("bend"),
+        most: MOST_CELLS,
+    };
+    sweep::sweep(&paths, sweep)
 }
 
 /// A template: its cells, and the map over them where they are curved.
@@ -195,25 +243,50 @@ pub fn transform(mesh: &mut MixedMesh, map: &mut Option<Map>, factors: [f64; 3],
     }
 }
 
+/// The settings of one operation.
+struct Operation<'a>(&'a Value);
+
+impl Operation<'_> {
+    fn name(&self) -> &str {
+        self.0.get("op").and_then(Value::as_str).unwrap_or_default()
+    }
+
+    fn number(&self, name: &str, default: f64) -> f64 {
+        self.0.get(name).and_then(Value::as_f64).unwrap_or(default)
+    }
+
+    fn layers(&self) -> usize {
+        self.0.get("layers").and_then(Value::as_u64).unwrap_or(1) as usize
+    }
+
+    fn has_box(&self) -> bool {
+        self.0.get("from").is_some() || self.0.get("to").is_some()
+    }
+
+    /// The box; everything where a corner is not given.
+    fn region(&self) -> Result<[[f64; 3]; 2], String> {
+        let corner = |name: &str, missing: f64| -> Result<[f64; 3], String> {
+            let Some(list) = self.0.get(name).and_then(Value::as_array) else {
+                return Ok([missing; 3]);
+            };
+            let numbers: Vec<f64> = list.iter().filter_map(Value::as_f64).collect();
+            <[f64; 3]>::try_from(numbers).map_err(|_| format!("`{name}` needs three numbers, [x, y, z]"))
+        };
+        Ok([corner("from", f64::NEG_INFINITY)?, corner("to", f64::INFINITY)?])
+    }
+}
+
 /// One operation of a recipe.
 fn apply(mesh: &MixedMesh, operation: &Value) -> Result<MixedMesh, String> {
-    let corner = |name: &str, missing: f64| -> Result<[f64; 3], String> {
-        let Some(list) = operation.get(name).and_then(Value::as_array) else {
-            return Ok([missing; 3]);
-        };
-        let numbers: Vec<f64> = list.iter().filter_map(Value::as_f64).collect();
-        <[f64; 3]>::try_from(numbers).map_err(|_| format!("`{name}` needs three numbers, [x, y, z]"))
-    };
-    let number = |name: &str, default: f64| operation.get(name).and_then(Value::as_f64).unwrap_or(default);
-    let region = [corner("from", f64::NEG_INFINITY)?, corner("to", f64::INFINITY)?];
-    let boxed = operation.get("from").is_some() || operation.get("to").is_some();
-    match operation.get("op").and_then(Value::as_str).unwrap_or_default() {
-        "carve" if !boxed => Err("carving needs a box: give `from` and `to`".to_string()),
+    let operation = Operation(operation);
+    let region = operation.region()?;
+    match operation.name() {
+        "carve" if !operation.has_box() => Err("carving needs a box: give `from` and `to`".to_string()),
         "carve" => carve::carve(mesh, region),
-        "extrude" => extrude::extrude(mesh, region, number("distance", 1.0), number("layers", 1.0) as usize),
-        "pillow" => pillow::pillow(mesh, number("thickness", 0.4)),
+        "extrude" => extrude::extrude(mesh, region, operation.number("distance", 1.0), operation.layers()),
+        "pillow" => pillow::pillow(mesh, operation.number("thickness", 0.4)),
         "collapse" => {
-            let axis = match operation.get("axis").and_then(Value::as_str) {
+            let axis = match operation.0.get("axis").and_then(Value::as_str) {
                 Some("y") => 1,
                 Some("z") => 2,
                 _ => 0,
@@ -222,6 +295,37 @@ fn apply(mesh: &MixedMesh, operation: &Value) -> Result<MixedMesh, String> {
         }
         other => Err(format!("unknown operation {other:?}")),
     }
+}
+
+fn is_surface(content: &Content) -> bool {
+    let cells = content.cells();
+    let faces = cells.triangles.len() + cells.quads.len();
+    faces > 0 && cells.tetrahedra.len() + cells.hexahedra.len() + cells.prisms.len() + cells.pyramids.len() == 0
+}
+
+/// The cells that a recipe's first operation extrudes from a surface.
+fn thickened(content: &Content, parameters: &Value) -> Result<(MixedMesh, Vec<String>), String> {
+    let first = parameters.get("recipe").and_then(|recipe| recipe.get(0)).map(Operation);
+    let Some(operation) = first.filter(|operation| operation.name() == "extrude") else {
+        return Err(
+            "the file holds a surface; give a volume mesh, or let the recipe start with { op = \"extrude\", distance = ... }"
+                .to_string(),
+        );
+    };
+    let triangles = content.triangles.iter().map(|face| face.to_vec());
+    let faces: Vec<Vec<u32>> = triangles
+        .chain(content.quads.iter().map(|face| face.to_vec()))
+        .collect();
+    let at = |reason: String| format!("step 0 of the recipe: {reason}");
+    let region = operation.region().map_err(at)?;
+    let distance = operation.number("distance", 1.0);
+    let mesh = extrude::thicken(&content.points, &faces, region, distance, operation.layers()).map_err(at)?;
+    MixedMesh::from_content(&Content {
+        points: mesh.points,
+        hexahedra: mesh.hexahedra,
+        prisms: mesh.prisms,
+        ..Content::default()
+    })
 }
 
 /// Lays the template into the target's box.

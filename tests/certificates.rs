@@ -9,6 +9,7 @@ use vargeo::fem::space::Space;
 use vargeo::linalg::processor::Processor;
 use vargeo::linalg::vector3::{Columns, cofactor, dot};
 use vargeo::mesh::mixed::{MixedMesh, Shape};
+use vargeo::mesh::template::grid;
 
 #[test]
 fn certificates_agree_with_stored_verdicts() {
@@ -150,7 +151,7 @@ fn kernels_are_smooth_in_the_middle() {
 fn gently_bent_prisms_and_tetrahedra_with_sines_are_certified() {
     for basis in basis::bases().iter().filter(|basis| !basis.is_polynomial()) {
         for shape in [Shape::Prism, Shape::Tetrahedron] {
-            for order in 2..=6 {
+            for order in [2, 3, 4, 5, 6, 9] {
                 let mut mesh = MixedMesh {
                     points: shape.canonical().to_vec(),
                     ..MixedMesh::default()
@@ -161,7 +162,9 @@ fn gently_bent_prisms_and_tetrahedra_with_sines_are_certified() {
                 let certifier = Certifier::new(*basis, space.cells.iter().map(|cell| cell.kind), 2000);
                 let reference = unit_reference(shape);
                 let lattice = Rule::Trapezoid.cell(shape, 12);
-                for size in [0.02, 1.0, 4.0] {
+                // What cannot be decided is cut as often as allowed, which takes long at high orders.
+                let sizes = if order > 6 { &[0.02][..] } else { &[0.02, 1.0, 4.0] };
+                for &size in sizes {
                     let mut x = space.linear(&mesh.points);
                     for (place, value) in x.iter_mut().enumerate().skip(3 * space.vertices) {
                         *value = size * (1.3 * place as f64).sin() / (1.0 + (place as f64 / 12.0));
@@ -176,6 +179,36 @@ fn gently_bent_prisms_and_tetrahedra_with_sines_are_certified() {
                         Verdict::Undecided(bound) => assert!(size > 0.02 && bound <= least, "{name}"),
                     }
                     assert!(size < 4.0 || least < 0.0, "{name}");
+                }
+            }
+        }
+    }
+}
+
+/// A square whose corner is drawn in until the determinant there is just above or just below zero, as a slab.
+#[test]
+fn determinants_near_zero_are_told_apart() {
+    for basis in basis::bases() {
+        for order in [1, 3, 8] {
+            for decided in [1e-4, -1e-4, 1e-2, -1e-2] {
+                let mut mesh = grid::grid([1, 1, 1]);
+                // At the corner (a, a) the determinant is 2 a - 1, and larger elsewhere.
+                for point in mesh.points.iter_mut().filter(|point| point[0] + point[1] == 2.0) {
+                    (point[0], point[1]) = (0.5 * (1.0 + decided), 0.5 * (1.0 + decided));
+                }
+                let topology = mesh.topology().unwrap();
+                let space = Space::new(&mesh, &topology, *basis, &[order]).unwrap();
+                let certifier = Certifier::new(*basis, space.cells.iter().map(|cell| cell.kind), 4000);
+                let x = space.linear(&mesh.points);
+                let verdict = certifier.judge(&space, 0, &unit_reference(Shape::Hexahedron), &x);
+                let name = format!("{} order {order} determinant {decided}: {verdict:?}", basis.name());
+                match verdict {
+                    Verdict::Positive(bound) => assert!(bound > 0.0 && bound <= decided * (1.0 + 1e-9), "{name}"),
+                    Verdict::Negative(point, value) => {
+                        let there = determinant_at(&space, &unit_reference(Shape::Hexahedron), &x, point);
+                        assert!(decided < 0.0 && value <= 0.0 && (there - value).abs() < 1e-12, "{name}");
+                    }
+                    Verdict::Undecided(_) => panic!("{name}"),
                 }
             }
         }

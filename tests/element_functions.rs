@@ -6,12 +6,15 @@ use std::collections::BTreeMap;
 use vargeo::energy;
 use vargeo::energy::mapping::Density;
 use vargeo::fem::basis::{Basis, bases, find};
-use vargeo::fem::batches::{Batches, references_of_volume};
+use vargeo::fem::batches::{Batches, references_of_volume, unit_reference};
 use vargeo::fem::functions::{line_table, tetrahedron_table, triangle_inside, triangle_table};
 use vargeo::fem::quadrature::{RULES, Rule};
 use vargeo::fem::space::{CellSlots, Space};
 use vargeo::fem::volume_energy::VolumeEnergy;
+use vargeo::linalg::vector3::apply;
 use vargeo::mesh::mixed::{MixedMesh, Shape};
+use vargeo::mesh::template::grid;
+use vargeo::method::volume_fit::quality;
 
 /// Numbers in [0, 1) and what is drawn by them.
 struct Random(Noise);
@@ -33,7 +36,7 @@ impl Random {
 }
 
 /// Value and gradient of every node's function at a point of a cell.
-fn at_point(basis: &dyn Basis, cell: &CellSlots, point: [f64; 3]) -> BTreeMap<usize, [f64; 4]> {
+pub(crate) fn at_point(basis: &dyn Basis, cell: &CellSlots, point: [f64; 3]) -> BTreeMap<usize, [f64; 4]> {
     let order = cell.kind.order;
     let [u, v, w] = point;
     let mut local = Vec::new();
@@ -259,6 +262,85 @@ fn neighbours_agree_on_their_face_in_every_orientation() {
                     };
                     assert_eq!(shared / 2, most, "{first:?} {second:?} share all functions of the face");
                 }
+            }
+        }
+    }
+}
+
+/// Four cubes around an edge, one of a lower order: the edge takes it, though two of its faces keep the higher one, and
+/// all four cells agree along it.
+#[test]
+fn an_edge_may_have_a_lower_order_than_the_faces_beside_it() {
+    let mesh = grid::grid([2, 2, 1]);
+    let topology = mesh.topology().unwrap();
+    let at = |place: [f64; 3]| mesh.points.iter().position(|point| *point == place).unwrap() as u32;
+    let mut ends = [at([1.0, 1.0, 0.0]), at([1.0, 1.0, 1.0])];
+    ends.sort_unstable();
+    let edge = topology.edges.iter().position(|edge| *edge == ends).unwrap();
+    for basis in bases() {
+        let space = Space::new(&mesh, &topology, *basis, &[2, 5, 5, 5]).unwrap();
+        let orders = |faces: &[u32]| {
+            let mut orders: Vec<usize> = faces.iter().map(|&face| space.face(face as usize).1).collect();
+            orders.sort_unstable();
+            orders
+        };
+        let around: Vec<u32> = (0..topology.faces.len() as u32)
+            .filter(|&face| {
+                ends.iter()
+                    .all(|end| topology.faces[face as usize].corners().contains(end))
+            })
+            .collect();
+        assert_eq!((space.edge(edge).1, orders(&around)), (2, vec![2, 2, 5, 5]));
+        for height in [0.1, 0.37, 0.8] {
+            let traces: Vec<BTreeMap<usize, [f64; 4]>> = (0..4)
+                .map(|cell| {
+                    let [x, y] = [[1.0, 1.0], [0.0, 1.0], [1.0, 0.0], [0.0, 0.0]][cell];
+                    at_point(*basis, &space.cells[cell], [x, y, height])
+                })
+                .collect();
+            for (cell, trace) in traces.iter().enumerate() {
+                let own = trace.iter().filter(|(_, value)| value[0].abs() > 1e-13);
+                let nodes: Vec<usize> = own.clone().map(|(node, _)| *node).collect();
+                assert_eq!(nodes.len(), 3, "{} cell {cell}: {nodes:?}", basis.name());
+                for (node, value) in own {
+                    assert!(
+                        (traces[0][node][0] - value[0]).abs() < 1e-13,
+                        "{} cell {cell}",
+                        basis.name()
+                    );
+                }
+            }
+        }
+    }
+}
+
+/// The shape at which a scaled Jacobian is 1, straight but with functions of high order, moved and turned.
+#[test]
+fn ideal_cells_have_the_scaled_jacobian_one_at_every_order() {
+    for basis in bases() {
+        for shape in Shape::ALL {
+            for order in [1, 4, 9] {
+                let reference = unit_reference(shape);
+                let turn = |[x, y, z]: [f64; 3]| [0.6 * x - 0.8 * y + 3.0, 0.8 * x + 0.6 * y, z - 1.0];
+                let place = |corner: &[f64; 3]| turn(apply(&reference, *corner).map(|x| 2.5 * x));
+                let mut mesh = MixedMesh {
+                    points: shape.canonical().iter().map(place).collect(),
+                    ..MixedMesh::default()
+                };
+                mesh.push(shape, &(0..shape.corners() as u32).collect::<Vec<_>>());
+                let topology = mesh.topology().unwrap();
+                let space = Space::new(&mesh, &topology, *basis, &[order]).unwrap();
+                let x = space.linear(&mesh.points);
+                let quality = quality::quality(&space, &[reference], &x).unwrap();
+                let [mean, least] = [quality.scaled_jacobian_mean[0], quality.scaled_jacobian_min[0]];
+                assert!(
+                    (mean - 1.0).abs() < 1e-12 && (least - 1.0).abs() < 1e-12,
+                    "{shape:?} {order}: {mean} {least}"
+                );
+                assert!(
+                    (quality.least_determinant[0] / 2.5_f64.powi(3) - 1.0).abs() < 1e-12,
+                    "{shape:?} {order}"
+                );
             }
         }
     }

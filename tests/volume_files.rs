@@ -1,6 +1,7 @@
 //! Files of curved volumes: the order of points that VTK 9.7 and Gmsh 4.15 state themselves, one point where cells
 //! meet, and coefficients that come back to the last bit or not at all.
 
+use crate::element_functions::at_point;
 use crate::sample::Noise;
 use proptest::prelude::*;
 use std::collections::BTreeMap;
@@ -110,6 +111,71 @@ fn cells_that_meet_share_their_points_and_straight_ones_keep_their_lattice() {
                         .sum();
                     let found = form.mesh.points[node as usize][axis];
                     assert!((wanted - found).abs() < 1e-13, "{shape:?} {point:?}: {wanted} {found}");
+                }
+            }
+        }
+    }
+}
+
+/// Silvester's polynomial: 1 where `t = n / order`, 0 at the multiples below.
+fn silvester(n: usize, order: usize, t: f64) -> f64 {
+    (0..n).map(|m| (order as f64 * t - m as f64) / (n - m) as f64).product()
+}
+
+/// Lagrange's function of a lattice point.
+fn lagrange_function(shape: Shape, order: usize, [i, j, k]: [usize; 3], [u, v, w]: [f64; 3]) -> f64 {
+    let r = |n: usize, t: f64| silvester(n, order, t);
+    let line = |n: usize, t: f64| r(n, t) * r(order - n, 1.0 - t);
+    match shape {
+        Shape::Hexahedron => line(i, u) * line(j, v) * line(k, w),
+        Shape::Prism => r(i, u) * r(j, v) * r(order - i - j, 1.0 - u - v) * line(k, w),
+        Shape::Tetrahedron => r(i, u) * r(j, v) * r(k, w) * r(order - i - j - k, 1.0 - u - v - w),
+    }
+}
+
+/// A polynomial map of any order is what its lattice points interpolate: between them as well.
+#[test]
+fn curved_cells_are_the_map_between_their_points_too() {
+    let mesh = mixed();
+    let topology = mesh.topology().unwrap();
+    let mut noise = Noise(5);
+    for basis in basis::bases().iter().filter(|basis| basis.is_polynomial()) {
+        let orders: Vec<usize> = (0..mesh.cells()).map(|cell| [3, 5, 2, 4][cell % 4]).collect();
+        let space = Space::new(&mesh, &topology, *basis, &orders).unwrap();
+        let references: Vec<_> = mesh.iter().map(|(shape, _)| unit_reference(shape)).collect();
+        let mut x = space.linear(&mesh.points);
+        for value in &mut x[3 * mesh.points.len()..] {
+            *value = 0.1 * noise.number();
+        }
+        let form = lagrange(&mesh, &space, &references, &x, 16).unwrap();
+        assert_eq!((form.approximated, form.cut), (0, 0));
+        for (cell, slots) in form.mesh.cells.iter().zip(&space.cells) {
+            for _ in 0..5 {
+                let mut point = noise.point().map(|t| 0.5 * (t + 1.0));
+                match cell.shape {
+                    Shape::Hexahedron => {}
+                    Shape::Prism => point[1] *= 1.0 - point[0],
+                    Shape::Tetrahedron => point = [0.3, 0.4, 0.2].map(|share| share * point[0]),
+                }
+                let mut wanted = [0.0; 3];
+                for (node, value) in at_point(*basis, slots, point) {
+                    for axis in 0..3 {
+                        wanted[axis] += value[0] * x[3 * node + axis];
+                    }
+                }
+                let mut found = [0.0; 3];
+                for (place, &node) in lattice(cell.shape, cell.order).iter().zip(&cell.nodes) {
+                    let weight = lagrange_function(cell.shape, cell.order, *place, point);
+                    for axis in 0..3 {
+                        found[axis] += weight * form.mesh.points[node as usize][axis];
+                    }
+                }
+                for axis in 0..3 {
+                    assert!(
+                        (wanted[axis] - found[axis]).abs() < 1e-11,
+                        "{:?} {wanted:?} {found:?}",
+                        cell.shape
+                    );
                 }
             }
         }

@@ -155,6 +155,10 @@ fn every_mistake_has_its_place_and_its_mend() {
             "2:8 \"models.bar.mesh\" says neither generate nor file | expected \"FILE\" or { generate = \"ball\", ... } | did you mean \"generate\" instead of \"genrate\"?",
         ),
         (
+            "[models.bar]\nmesh = { shape = \"bar\" }",
+            "2:8 \"models.bar.mesh\" says neither generate nor file | expected \"FILE\" or { generate = \"ball\", ... } | did you mean \"generate\" instead of \"shape\"?",
+        ),
+        (
             "[models.bar]\nmesh = { generate = \"ball\", file = \"x\" }",
             "2:29 both \"generate\" and \"file\" are given |  | keep one of the two",
         ),

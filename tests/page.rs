@@ -312,3 +312,25 @@ fn diagonals_of_quadrilateral_faces_are_not_drawn() {
         );
     }
 }
+
+/// A body is cut open towards the eye, a flat one along its plane, where the cut leaves its outline.
+#[test]
+fn flat_bodies_are_cut_open_along_their_plane() {
+    use vargeo::report::picture::{EYE, cut};
+    let corner = |size: [f64; 3], index: usize| [0, 1, 2].map(|axis| size[axis] * (index >> axis & 1) as f64);
+    for (size, axis) in [
+        ([1.0, 1.0, 1.0], 1),
+        ([4.0, 1.0, 1.0], 1),
+        ([4.0, 3.0, 1.0], 2),
+        ([1.0, 3.0, 9.0], 0),
+    ] {
+        let points: Vec<[f64; 3]> = (0..8).map(|index| corner(size, index)).collect();
+        let plane = cut::Plane::towards(EYE, &points);
+        let normal = [0, 1, 2].map(|other| if other == axis { EYE[axis].signum() } else { 0.0 });
+        assert_eq!(
+            (plane.normal, plane.offset),
+            (normal, 0.5 * normal[axis] * size[axis]),
+            "{size:?}"
+        );
+    }
+}

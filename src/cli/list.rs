@@ -7,6 +7,7 @@ use crate::experiment::claims::CLAIMS;
 use crate::experiment::column::columns;
 use crate::experiment::record::STOPS;
 use crate::mesh::format::FORMATS;
+use crate::method::model::Generator;
 use crate::method::setting::{Default, Field, Kind};
 use crate::method::{Method, methods};
 use crate::metric::Better;
@@ -290,12 +291,12 @@ fn models(method: &'static dyn Method) -> Vec<Group> {
         let describe = |field: &Field| {
             let parameter = setting(field, field.name);
             let space = if parameter.note.is_empty() { "" } else { " " };
-            format!(
-                "{}{space}{}: {}",
-                parameter.name,
-                parameter.note,
-                parameter.text.join(" ")
-            )
+            let sentence = |text: &String| match text.ends_with('.') {
+                true => text.clone(),
+                false => format!("{text}."),
+            };
+            let text: Vec<String> = parameter.text.iter().map(sentence).collect();
+            format!("{}{space}{}: {}", parameter.name, parameter.note, text.join(" "))
         };
         if role.file && !role.file_parameters.is_empty() {
             items.push(Item {
@@ -304,9 +305,38 @@ fn models(method: &'static dyn Method) -> Vec<Group> {
                 text: role.file_parameters.iter().map(describe).collect(),
             });
         }
+        let described = |generator: &Generator| -> Vec<(&str, String)> {
+            let parameters = generator.parameters.iter();
+            parameters.map(|field| (field.name, describe(field))).collect()
+        };
+        // What most generators take is told once.
+        let mut shared: Vec<(&str, String)> = Vec::new();
+        for one in role.generators.iter().flat_map(described) {
+            let count = role
+                .generators
+                .iter()
+                .filter(|other| described(other).contains(&one))
+                .count();
+            if count > 2 && 2 * count > role.generators.len() && !shared.contains(&one) {
+                shared.push(one);
+            }
+        }
+        if !shared.is_empty() {
+            items.push(Item {
+                name: "parameters of most".to_owned(),
+                note: String::new(),
+                text: shared.iter().map(|(_, text)| text.clone()).collect(),
+            });
+        }
         for generator in role.generators {
             let mut text = vec![generator.doc.to_owned()];
-            text.extend(generator.parameters.iter().map(describe));
+            let (common, own): (Vec<_>, Vec<_>) =
+                described(generator).into_iter().partition(|one| shared.contains(one));
+            text.extend(own.into_iter().map(|(_, text)| text));
+            if !common.is_empty() {
+                let names: Vec<&str> = common.into_iter().map(|(name, _)| name).collect();
+                text.push(format!("And {} as above.", names.join(", ")));
+            }
             items.push(Item {
                 name: generator.name.to_owned(),
                 note: String::new(),

@@ -11,6 +11,9 @@ use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
+/// The words that say which generator makes a part: one of them by role.
+const GENERATOR_KEYS: [&str; 2] = ["generate", "shape"];
+
 /// The role whose generator `model.PARAMETER` sets: `mesh`, or the first.
 pub fn main_role(method: &dyn Method) -> Option<&'static Role> {
     let roles = method.model().roles;
@@ -236,7 +239,12 @@ fn read_part(
                     let diagnostic = checker.error(node.span.clone(), message);
                     diagnostic.label = format!("expected {}", example(role));
                     diagnostic.help = table.entries.iter().find_map(|entry| {
-                        let near = crate::experiment::nearest::nearest(&entry.key, known.iter().copied())?;
+                        // The word that another role uses.
+                        let foreign = GENERATOR_KEYS.contains(&entry.key.as_str()) && !role.generators.is_empty();
+                        let near = match foreign {
+                            true => role.generator_key,
+                            false => crate::experiment::nearest::nearest(&entry.key, known.iter().copied())?,
+                        };
                         Some(format!("did you mean \"{near}\" instead of \"{}\"?", entry.key))
                     });
                     None

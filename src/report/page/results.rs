@@ -7,6 +7,7 @@ use crate::experiment::file::Experiment;
 use crate::report::ReportError;
 use crate::report::number::round;
 use crate::report::picture::colour::{MAP, Scale};
+use crate::report::picture::cut::opened_along;
 use crate::report::picture::solid::Solid;
 use crate::report::picture::{EYE, poster};
 use crate::report::row::{Quantity, Row, label};
@@ -362,9 +363,11 @@ impl Embedded {
         let packed = mesh::image(solid, &self.meshes[number].1, &ranges, self.levels);
         let index = self.job_facts.len();
         let names: Vec<&str> = solid.fields.iter().map(|field| field.name.as_str()).collect();
+        let axis = opened_along(EYE, &solid.points);
         self.job_facts.push(json!({
             "name": row.name,
             "mesh": number,
+            "cut": format!("{}{}", if EYE[axis] < 0.0 { '-' } else { '+' }, ["x", "y", "z"][axis]),
             "box": packed.boxes.first(),
             "fields": names,
         }));
@@ -395,13 +398,8 @@ impl Embedded {
                 (name, value)
             })
             .collect();
-        let axis = (0..3)
-            .max_by(|&left, &right| EYE[left].abs().total_cmp(&EYE[right].abs()))
-            .unwrap_or(0);
-        let cut = format!("{}{}", if EYE[axis] < 0.0 { '-' } else { '+' }, ["x", "y", "z"][axis]);
         let data = json!({
             "eye": EYE,
-            "cut": cut,
             "map": MAP,
             "levels": self.levels,
             "steps": mesh::STEPS,

@@ -248,7 +248,7 @@ o=vec4(mix(c*s,vec3(.05),k*wire),1.);}`));
     redo();
   };
   const open = async j => {
-    if (!shown) { home(); state.cut = $("cut").value = data.cut; }
+    if (!shown) { home(); state.cut = $("cut").value = data.jobs[j].cut; }
     box.showModal();
     await choose(j);
     canvas.focus();

@@ -1,6 +1,7 @@
 //! What is seen of a mesh: its boundary faces, or what a plane leaves of them and the section through the cells.
 
 use super::solid::Solid;
+use crate::mesh::bounding_box;
 
 /// A polygon to draw, of a cell.
 #[derive(Clone, Debug, PartialEq)]
@@ -25,24 +26,38 @@ fn dot(left: [f64; 3], right: [f64; 3]) -> f64 {
 }
 
 impl Plane {
-    /// The plane through the middle of the points, square to the axis that points most at the eye; what is nearer goes.
+    /// The plane through the middle of the points, square to the [axis](opened_along) that shows most; what is nearer to the
+    /// eye goes.
     pub fn towards(eye: [f64; 3], points: &[[f64; 3]]) -> Plane {
-        let axis = (0..3)
-            .max_by(|&left, &right| eye[left].abs().total_cmp(&eye[right].abs()))
-            .unwrap_or(0);
-        let low = points.iter().map(|point| point[axis]).fold(f64::INFINITY, f64::min);
-        let high = points.iter().map(|point| point[axis]).fold(f64::NEG_INFINITY, f64::max);
+        let axis = opened_along(eye, points);
+        let [low, high] = bounding_box(points).unwrap_or_default();
         let mut normal = [0.0; 3];
         normal[axis] = eye[axis].signum();
         Plane {
             normal,
-            offset: normal[axis] * 0.5 * (low + high),
+            offset: normal[axis] * 0.5 * (low[axis] + high[axis]),
         }
     }
 
     fn height(&self, point: [f64; 3]) -> f64 {
         dot(self.normal, point) - self.offset
     }
+}
+
+/// A body is flat when its shortest extent is less than this share of the next.
+const FLAT: f64 = 0.5;
+
+/// The axis square to which points are cut open: that which points most at the eye, or along which the body is flat, as a
+/// plane across a flat body takes most of its outline away.
+pub fn opened_along(eye: [f64; 3], points: &[[f64; 3]]) -> usize {
+    let [low, high] = bounding_box(points).unwrap_or_default();
+    let mut axes = [0, 1, 2];
+    axes.sort_by(|&left, &right| (high[left] - low[left]).total_cmp(&(high[right] - low[right])));
+    if high[axes[0]] - low[axes[0]] < FLAT * (high[axes[1]] - low[axes[1]]) {
+        return axes[0];
+    }
+    axes.sort_by(|&left, &right| eye[right].abs().total_cmp(&eye[left].abs()));
+    axes[0]
 }
 
 /// The faces of tetrahedra that belong to one cell only, with that cell.

@@ -350,6 +350,7 @@ fn squares_swept_along_paths_join_and_close() {
     assert_eq!(figures(&knot).0, 0);
     // What cannot be swept is named.
     let refused = |path: &[[f64; 2]], settings: Sweep| sweep(&[flat(path)], settings).unwrap_err();
+    assert!(sweep(&[], settings).unwrap_err().contains("no path is given"));
     assert!(refused(&[[0.0, 0.0]], settings).contains("fewer than two points"));
     assert!(refused(&[[0.0, 0.0], [0.0, 0.0]], settings).contains("points 0 and 1 are the same"));
     assert!(refused(&[[0.0, 0.0], [2.0, 0.0], [0.0, 0.0]], settings).contains("turns back on itself at point 1"));
@@ -385,6 +386,8 @@ fn a_surface_file_is_extruded() {
     assert!((figures(&mesh).1 - 1.0).abs() < 1e-12);
     let reason = |parameters: Value| read(parameters).err().unwrap().reason;
     assert!(reason(json!({})).contains("let the recipe start with"));
+    let flat = json!({ "recipe": [{ "op": "extrude", "distance": 0.0 }] });
+    assert!(reason(flat).contains("has no volume"));
     let empty = json!({ "recipe": [{ "op": "extrude", "from": [9, 9, 9], "to": [10, 10, 10] }] });
     assert!(reason(empty).contains("no triangle or quad has its centroid"));
 }

@@ -8,8 +8,9 @@ use crate::mesh::{add_scaled, cross, length, subtract};
 /// normals of these faces at each vertex.
 ///
 /// # Errors
-/// When no boundary face lies there, or the mesh is not valid.
+/// When no boundary face lies there, the distance is 0, or the mesh is not valid.
 pub fn extrude(mesh: &MixedMesh, region: [[f64; 3]; 2], distance: f64, layers: usize) -> Result<MixedMesh, String> {
+    check(distance)?;
     let topology = mesh.topology()?;
     let faces: Vec<Vec<u32>> = topology
         .boundary()
@@ -27,11 +28,18 @@ pub fn extrude(mesh: &MixedMesh, region: [[f64; 3]; 2], distance: f64, layers: u
     Ok(result)
 }
 
+fn check(distance: f64) -> Result<(), String> {
+    if distance == 0.0 {
+        return Err("an extrusion by the distance 0 has no volume; give a distance above or below".to_string());
+    }
+    Ok(())
+}
+
 /// Cells on the triangles and quads of a surface whose centroid lies in the box, outward for a positive distance, inward for
 /// a negative one.
 ///
 /// # Errors
-/// When no face lies there, or one names a vertex that is not there.
+/// When no face lies there, one names a vertex that is not there, or the distance is 0.
 pub fn thicken(
     points: &[[f64; 3]],
     faces: &[Vec<u32>],

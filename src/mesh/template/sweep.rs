@@ -30,8 +30,8 @@ type Station = ([f64; 3], [f64; 3]);
 /// Sweeps every path. Points on a straight part of a path are sections too.
 ///
 /// # Errors
-/// No path, a path of fewer than two points or with equal neighbours, an arc that does not fit between its neighbours, a cell that
-/// is turned over, or too many cells.
+/// No path, a path of fewer than two points or with equal neighbours, an arc that does not fit between its neighbours, a cell
+/// that is turned over, or too many cells.
 pub fn sweep(paths: &[Vec<[f64; 3]>], sweep: Sweep) -> Result<MixedMesh, String> {
     if paths.is_empty() {
         return Err("no path is given; `paths` needs a list of lists of points".to_string());

@@ -1,4 +1,5 @@
-//! Templates for volumes: grids, voxels and squares swept along paths, and the operations that turn them into something close to a shape.
+//! Templates for volumes: grids, voxels and squares swept along paths, and the operations that turn them into something
+//! close to a shape.
 //!
 //! The operations are those that Jin et al. 2013 made their templates with by hand (section 4.1): carving, extrusion,
 //! pillowing and edge collapse. Every one leaves a mesh that [`MixedMesh::topology`](super::mixed::MixedMesh::topology)

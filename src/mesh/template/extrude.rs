@@ -47,6 +47,7 @@ pub fn thicken(
     distance: f64,
     layers: usize,
 ) -> Result<MixedMesh, String> {
+    check(distance)?;
     if let Some(face) = faces
         .iter()
         .find(|face| face.iter().any(|&corner| corner as usize >= points.len()))

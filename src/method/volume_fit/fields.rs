@@ -277,7 +277,8 @@ pub static FIELDS: &[Field] = &[
         default: Default::Absent,
         doc: "How often, at most, elements that are invalid between quadrature points at the end are mended, with more points \
               every time: on their own with their neighbours if at most one in five fails, otherwise, and after that, by \
-              going on with the whole fit. The map with the fewest failing elements is kept. Preset best: 10, paper: 0.",
+              going on with the whole fit. Where more fail after the last stage, small meshes are first fitted once more from \
+              the template with three times the points. The map with the fewest failing elements is kept. Preset best: 10, paper: 0.",
     },
     Field {
         name: "subdivision_levels",

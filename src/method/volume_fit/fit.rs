@@ -46,6 +46,8 @@ pub(super) struct Fit<'a> {
     pub(super) stages: usize,
     /// Quadrature points added a direction, after elements came out invalid between the points.
     pub(super) extra_points: usize,
+    /// Orders and map of the template where the stages alone lead from there to the end.
+    pub(super) start: Option<(Vec<usize>, Vec<f64>)>,
     /// Certificates of the present map, once they are known.
     pub(super) certificates: Option<Certificates>,
 }
@@ -201,6 +203,7 @@ impl<'a> Fit<'a> {
             increases: 0,
             stages: 0,
             extra_points: 0,
+            start: None,
             certificates: None,
         })
     }
@@ -328,6 +331,9 @@ impl<'a> Fit<'a> {
         if self.settings.levels > 0 {
             (stop, reason) = subdivision::run(self, self.settings.levels, observer)?;
             return self.finish(stop, reason, inverted_at_start, observer);
+        }
+        if self.settings.adaptive.is_none() && self.settings.repairs > 0 {
+            self.start = Some((self.space.orders.clone(), self.x.clone()));
         }
         let stages = self.settings.stages.clone();
         for stage in stages {

@@ -55,7 +55,7 @@ impl Method for VolumeFit {
     }
 
     fn version(&self) -> u32 {
-        8
+        9
     }
 
     fn summary(&self) -> &'static str {

@@ -5,7 +5,7 @@
 //! First determinants are turned, then the barrier spaces them out. Not guaranteed: success, and that the mended map is a
 //! minimum of the whole energy; it differs from one in the patch alone.
 
-use super::fit::Fit;
+use super::fit::{Fit, interrupted};
 use super::objective::Parts;
 use super::preconditioner::{self, Model};
 use super::untangle;
@@ -31,6 +31,12 @@ const CHANGE: f64 = 1e-6;
 
 /// Quadrature points a direction that every repair has more than the one before.
 const EXTRA: usize = 3;
+
+/// Where more than a few elements fail, the fit is made once more with so many times the points.
+const AFRESH: usize = 3;
+
+/// Quadrature points of the whole mesh at most for which that is done: it takes long.
+const MOST_POINTS: usize = 2_000_000;
 
 /// A map with fewer failing elements is not taken when its surface energy is so many times higher, and by more than the
 /// volume energy weighs. That one itself is of no use here: where elements fail, its points were too few to measure it.
@@ -220,18 +226,23 @@ impl Fit<'_> {
         let mut certificates = Certificates::of_all(&self.space, &self.references, &self.x, observer);
         let before = certificates.failing().len();
         // The best so far; the rounds go on from where they are.
-        let mut best = (certificates.clone(), self.x.clone());
+        let mut best = (certificates.clone(), self.space.clone(), self.x.clone());
         let mut in_place = false;
-        for _ in 0..self.settings.repairs {
+        for round in 0..self.settings.repairs {
             let failing = certificates.failing();
             if failing.is_empty() || observer.stop().is_some() {
                 break;
             }
             observer.phase("repair");
-            self.extra_points += EXTRA;
             in_place = !in_place && self.few(&failing);
+            let usual = self.settings.quadrature_points(self.space.highest_order());
+            let cost = self.volume.cells() * (AFRESH * usual).pow(3);
+            let afresh = round == 0 && !in_place && self.start.is_some() && cost <= MOST_POINTS;
+            self.extra_points += if afresh { (AFRESH - 1) * usual } else { EXTRA };
             let moved = if in_place {
                 repair(self, &failing, observer)?
+            } else if afresh {
+                self.start_afresh(observer)?
             } else {
                 self.repair_all(observer)?
             };
@@ -244,7 +255,7 @@ impl Fit<'_> {
                 ));
             }
             if dear || observer.stop().is_some() {
-                (certificates, self.x) = best.clone();
+                (certificates, self.space, self.x) = best.clone();
                 if in_place {
                     continue;
                 }
@@ -253,10 +264,10 @@ impl Fit<'_> {
             observer.phase("certify");
             certificates.renew(&moved, &self.space, &self.references, &self.x, observer);
             if observer.stop().is_none() && certificates.failing().len() < best.0.failing().len() {
-                best = (certificates.clone(), self.x.clone());
+                best = (certificates.clone(), self.space.clone(), self.x.clone());
             }
         }
-        (certificates, self.x) = best;
+        (certificates, self.space, self.x) = best;
         if before > 0 {
             self.notices.push(format!(
                 "{before} elements were invalid between quadrature points after the last stage; after repairs with up to \
@@ -272,6 +283,33 @@ impl Fit<'_> {
         }
         self.certificates = Some(certificates);
         Ok(observer.stop())
+    }
+
+    /// Goes through the stages again from the template: where many elements fold between the points, the way there is to be
+    /// taken with more of them. Gives all elements: none where they got tangled.
+    fn start_afresh(&mut self, observer: &mut dyn Observer) -> Result<Vec<usize>, Failure> {
+        let Some((orders, x)) = self.start.clone() else {
+            return Ok(Vec::new());
+        };
+        self.space =
+            Space::new(&self.volume, &self.topology, self.settings.basis, &orders).map_err(Failure::invalid)?;
+        self.x = x;
+        let settings = self.settings;
+        for stage in &settings.stages {
+            let orders: Vec<usize> = self.space.orders.iter().map(|&order| order.max(stage.order)).collect();
+            self.raise(&orders)?;
+            match self.stage(stage, observer) {
+                Ok((stop, _)) if interrupted(stop) => break,
+                Ok(_) => {}
+                Err(failure) if failure.kind == TANGLED => {
+                    self.notices
+                        .push(format!("a fit from the start was given up: {}", failure.reason));
+                    return Ok(Vec::new());
+                }
+                Err(failure) => return Err(failure),
+            }
+        }
+        Ok((0..self.volume.cells()).collect())
     }
 
     /// Goes on with the last stage. Gives all elements: none where they got tangled.

@@ -435,6 +435,31 @@ fn every_way_of_cutting() {
 
 /// More sites than are cut at once, as near to each other along a line or all over a triangle: time and memory stay
 /// bounded.
+/// Sites on a circle about a line of the triangles' plane: all bisectors meet the plane in that line, or nearly so.
+#[test]
+fn bisectors_that_nearly_coincide() {
+    let mut noise = Noise(11);
+    for round in 0..300 {
+        let corners: Vec<Point> = (0..3).map(|_| noise.point()).map(|[x, y, _]| [x, y, 0.0]).collect();
+        let (points, cells) = soup(corners);
+        let [x, y, _] = noise.point();
+        let turn = std::f64::consts::PI * noise.number();
+        let off = [0.0, 1e-15, 1e-13, 1e-10][round % 4];
+        let sites: Vec<Point> = (0..3)
+            .map(|_| {
+                let angle = std::f64::consts::PI * noise.number();
+                let (across, up) = (0.7 * angle.cos(), 0.7 * angle.sin());
+                [
+                    x - across * turn.sin() + off * noise.number(),
+                    y + across * turn.cos(),
+                    up,
+                ]
+            })
+            .collect();
+        check(&format!("about a line, {round}"), &points, &cells, &sites);
+    }
+}
+
 #[test]
 fn many_sites_as_near() {
     // On circles about an edge of one triangle and about a line through another.

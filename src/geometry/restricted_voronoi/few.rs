@@ -122,9 +122,23 @@ pub(super) fn divide_among_three(frame: &Frame, heights: [&[f64; 3]; 3], polygon
     }
     let mut centre = [0.0; 2];
     if count == 3 {
-        let [p, q] = [1, 2].map(|i| std::array::from_fn::<f64, 3, _>(|k| heights[i][k] - heights[0][k]));
-        let share = 1.0 / (p[0] * q[1] - p[1] * q[0]);
-        centre = [share * (p[1] * q[2] - p[2] * q[1]), share * (p[2] * q[0] - p[0] * q[2])];
+        // From the border along the steepest of the three bisectors: rounding moves the point along that line, not across
+        // it, also where the three nearly coincide.
+        let difference = |i: usize, j: usize| std::array::from_fn::<f64, 3, _>(|k| heights[j][k] - heights[i][k]);
+        let mut steepest = (-1.0, 0);
+        for (index, crossing) in crossings[..3].iter().enumerate() {
+            let p = difference(crossing.from, crossing.to);
+            let steepness = p[0] * p[0] + p[1] * p[1];
+            if steepness > steepest.0 {
+                steepest = (steepness, index);
+            }
+        }
+        let Crossing { edge, place, from, to } = crossings[steepest.1];
+        let (p, q) = (difference(from, to), difference(from, 3 - from - to));
+        let [start, end] = [frame.corners[edge], frame.corners[if edge == 2 { 0 } else { edge + 1 }]];
+        let at = [0, 1].map(|axis: usize| start[axis] + place * (end[axis] - start[axis]));
+        let t = (q[0] * at[0] + q[1] * at[1] + q[2]) / (p[0] * q[1] - p[1] * q[0]);
+        centre = [at[0] + t * p[1], at[1] - t * p[0]];
         if !(centre[0].is_finite() && centre[1].is_finite()) {
             return false;
         }

@@ -33,7 +33,7 @@ impl Method for CentroidalVoronoi {
     }
 
     fn version(&self) -> u32 {
-        5
+        6
     }
 
     fn summary(&self) -> &'static str {

@@ -47,7 +47,7 @@ impl Method for SurfaceFit {
     }
 
     fn version(&self) -> u32 {
-        7
+        8
     }
 
     fn summary(&self) -> &'static str {

@@ -198,7 +198,8 @@ impl Preconditioner {
         let mut shift = 1e-6 * mean;
         while let Err(error) = cholesky.factorize(&values, shift) {
             shift *= 100.0;
-            if shift > mean {
+            // Not-a-number or zero as well.
+            if !(shift > 0.0 && shift <= mean) {
                 return Err(format!("the preconditioner could not be factorized: {error}"));
             }
         }

@@ -306,7 +306,6 @@ fn squares_swept_along_paths_join_and_close() {
         width: 1.0,
         step: 1.0,
         bend: 1.0,
-        most: 10_000,
     };
     let flat = |path: &[[f64; 2]]| path.iter().map(|&[x, y]| [x, y, 0.0]).collect::<Vec<[f64; 3]>>();
     // A bar of five cells, a corner of two, a bar of two more.
@@ -348,17 +347,32 @@ fn squares_swept_along_paths_join_and_close() {
     let knot = sweep(&[knot], Sweep { bend: 0.0, ..settings }).unwrap();
     assert_eq!((knot.cells(), knot.points.len()), (60, 240));
     assert_eq!(figures(&knot).0, 0);
+    // A slight bend is one section, square to the mean direction: three cells, as without it, and none of them thin.
+    let slight = sweep(&[flat(&[[0.0, 0.0], [1.0, 0.0], [3.0, 0.01]])], settings).unwrap();
+    assert_eq!(slight.cells(), 3);
+    assert!((figures(&slight).1 - 3.0).abs() < 1e-3);
     // What cannot be swept is named.
     let refused = |path: &[[f64; 2]], settings: Sweep| sweep(&[flat(path)], settings).unwrap_err();
     assert!(sweep(&[], settings).unwrap_err().contains("no path is given"));
     assert!(refused(&[[0.0, 0.0]], settings).contains("fewer than two points"));
-    assert!(refused(&[[0.0, 0.0], [0.0, 0.0]], settings).contains("points 0 and 1 are the same"));
+    assert!(refused(&[[0.0, 0.0], [0.0, 0.0]], settings).contains("points 0 and 1 are 0 apart"));
+    let far = &[[1e12, 0.0], [1e12 + 2.0, 0.0]];
+    assert!(refused(far, settings).contains("point 0 is so far from the origin"));
+    let nearly = &[[0.0, 0.0], [2.0, 0.0], [2.0, 2.0001], [5.0, 2.0001]];
+    assert!(refused(nearly, settings).contains("leave a straight part of"));
     assert!(refused(&[[0.0, 0.0], [2.0, 0.0], [0.0, 0.0]], settings).contains("turns back on itself at point 1"));
     assert!(refused(&[[0.0, 0.0], [0.5, 0.0], [0.5, 4.0]], settings).contains("do not fit between points 0 and 1"));
     let tight = Sweep { bend: 0.3, ..settings };
     assert!(refused(&[[0.0, 0.0], [4.0, 0.0], [4.0, 4.0]], tight).contains("is turned over"));
+    // Bent just as much as a cell bears, its inner edges would be welded.
+    let collapsed = Sweep {
+        bend: 0.5 + 1e-7,
+        ..settings
+    };
+    assert!(refused(&[[0.0, 0.0], [4.0, 0.0], [4.0, 4.0]], collapsed).contains("is turned over"));
     let many = Sweep { step: 1e-9, ..settings };
-    assert!(refused(&[[0.0, 0.0], [4.0, 0.0]], many).contains("more than 10000 cells"));
+    assert!(refused(&[[0.0, 0.0], [4.0, 0.0]], many).contains("is too short for a width of 1"));
+    assert!(refused(&[[0.0, 0.0], [1e8, 0.0]], settings).contains("more than 4000000; raise `step`"));
 }
 
 /// Two squares and a triangle as a file: hexahedra and a prism.
@@ -386,8 +400,15 @@ fn a_surface_file_is_extruded() {
     assert!((figures(&mesh).1 - 1.0).abs() < 1e-12);
     let reason = |parameters: Value| read(parameters).err().unwrap().reason;
     assert!(reason(json!({})).contains("let the recipe start with"));
-    let flat = json!({ "recipe": [{ "op": "extrude", "distance": 0.0 }] });
-    assert!(reason(flat).contains("has no volume"));
+    for distance in [0.0, 1e-12] {
+        let flat = json!({ "recipe": [{ "op": "extrude", "distance": distance }] });
+        assert!(reason(flat).contains("has no volume"));
+    }
+    let many = json!({ "op": "extrude", "distance": 1.0, "layers": 1000 });
+    assert!(reason(json!({ "recipe": vec![many; 3] })).contains("more than 4000000; lower `layers`"));
+    // Scaled before it is extruded: distances are those of the scaled mesh.
+    let scaled = json!({ "scale": 2.0, "recipe": [{ "op": "extrude", "distance": 1.0 }] });
+    assert!((figures(&read(scaled).unwrap().mesh).1 - 10.0).abs() < 1e-12);
     let empty = json!({ "recipe": [{ "op": "extrude", "from": [9, 9, 9], "to": [10, 10, 10] }] });
     assert!(reason(empty).contains("no triangle or quad has its centroid"));
 }

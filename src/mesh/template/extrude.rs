@@ -1,16 +1,15 @@
 //! Layers of cells on boundary faces or on a surface.
 
-use super::{centroid, within};
+use super::{centroid, check_count, within};
 use crate::mesh::mixed::{MixedMesh, Shape};
-use crate::mesh::{add_scaled, cross, length, subtract};
+use crate::mesh::{add_scaled, cross, diagonal, length, subtract};
 
 /// Adds `layers` of cells of total height `distance` on the boundary faces whose centroid lies in the box, along the mean
 /// normals of these faces at each vertex.
 ///
 /// # Errors
-/// When no boundary face lies there, the distance is 0, or the mesh is not valid.
+/// When no boundary face lies there, a layer is too thin to have a volume, there are too many cells, or the mesh is not valid.
 pub fn extrude(mesh: &MixedMesh, region: [[f64; 3]; 2], distance: f64, layers: usize) -> Result<MixedMesh, String> {
-    check(distance)?;
     let topology = mesh.topology()?;
     let faces: Vec<Vec<u32>> = topology
         .boundary()
@@ -23,23 +22,34 @@ pub fn extrude(mesh: &MixedMesh, region: [[f64; 3]; 2], distance: f64, layers: u
             region[0], region[1]
         ));
     }
+    check(&mesh.points, mesh.cells(), faces.len(), distance, layers)?;
     let mut result = mesh.clone();
     stack(&mut result, &faces, distance, layers);
     Ok(result)
 }
 
-fn check(distance: f64) -> Result<(), String> {
-    if distance == 0.0 {
-        return Err("an extrusion by the distance 0 has no volume; give a distance above or below".to_string());
+/// Whether every layer has a height that rounding leaves, and there are not too many cells.
+fn check(points: &[[f64; 3]], cells: usize, faces: usize, distance: f64, layers: usize) -> Result<(), String> {
+    let least = 1e-9 * diagonal(points);
+    let height = distance.abs() / layers as f64;
+    if height <= least {
+        return Err(format!(
+            "an extrusion by the distance {distance} in {layers} layers has no volume beside a mesh of that size; give layers \
+             of more than {least:e}"
+        ));
     }
-    Ok(())
+    check_count(
+        cells.saturating_add(faces.saturating_mul(layers)),
+        "lower `layers`, or narrow the box",
+    )
 }
 
 /// Cells on the triangles and quads of a surface whose centroid lies in the box, outward for a positive distance, inward for
 /// a negative one.
 ///
 /// # Errors
-/// When no face lies there, one names a vertex that is not there, or the distance is 0.
+/// When no face lies there, one names a vertex that is not there or one twice, a layer is too thin to have a volume, or there
+/// are too many cells.
 pub fn thicken(
     points: &[[f64; 3]],
     faces: &[Vec<u32>],
@@ -47,15 +57,16 @@ pub fn thicken(
     distance: f64,
     layers: usize,
 ) -> Result<MixedMesh, String> {
-    check(distance)?;
-    if let Some(face) = faces
-        .iter()
-        .find(|face| face.iter().any(|&corner| corner as usize >= points.len()))
-    {
-        return Err(format!(
-            "the face {face:?} names a vertex that is not among the {}",
-            points.len()
-        ));
+    for face in faces {
+        if face.iter().any(|&corner| corner as usize >= points.len()) {
+            return Err(format!(
+                "the face {face:?} names a vertex that is not among the {}",
+                points.len()
+            ));
+        }
+        if (1..face.len()).any(|place| face[..place].contains(&face[place])) {
+            return Err(format!("the face {face:?} (vertices from 0) names a vertex twice"));
+        }
     }
     let inside = |face: &&Vec<u32>| within(centroid(points, face), region);
     let faces: Vec<Vec<u32>> = faces.iter().filter(inside).cloned().collect();
@@ -65,6 +76,7 @@ pub fn thicken(
             region[0], region[1]
         ));
     }
+    check(points, 0, faces.len(), distance, layers)?;
     let mut result = MixedMesh {
         points: points.to_vec(),
         ..MixedMesh::default()

@@ -13,6 +13,20 @@ pub mod extrude;
 pub mod pillow;
 pub mod sweep;
 
+/// Most cells of a template.
+pub const MOST_CELLS: usize = 4_000_000;
+
+/// Before memory is taken: whether a template may have so many cells.
+///
+/// # Errors
+/// With more than [`MOST_CELLS`]; `mend` tells what lowers them.
+pub fn check_count(cells: usize, mend: &str) -> Result<(), String> {
+    if cells > MOST_CELLS {
+        return Err(format!("that makes {cells} cells, more than {MOST_CELLS}; {mend}"));
+    }
+    Ok(())
+}
+
 /// Whether a point lies in a box with faces included.
 fn within(point: [f64; 3], [low, high]: [[f64; 3]; 2]) -> bool {
     (0..3).all(|axis| low[axis] <= point[axis] && point[axis] <= high[axis])

@@ -1,15 +1,19 @@
 //! A layer of cells around the whole boundary, which takes singular edges off the surface (Mitchell and Tautges 1995).
 
-use super::centroid;
+use super::{centroid, check_count};
 use crate::mesh::mixed::{MixedMesh, Shape};
 
 /// Every boundary face gets a cell: the old boundary vertices move inward by `thickness` of the way to the mean of their
 /// cells, new vertices take their places.
 ///
 /// # Errors
-/// When the mesh is not valid.
+/// When the mesh is not valid, or the result would have too many cells.
 pub fn pillow(mesh: &MixedMesh, thickness: f64) -> Result<MixedMesh, String> {
     let topology = mesh.topology()?;
+    check_count(
+        mesh.cells() + topology.boundary().count(),
+        "pillow a coarser template, or fewer times",
+    )?;
     let vertices = mesh.points.len();
     let mut outer = vec![u32::MAX; vertices];
     let mut result = mesh.clone();

@@ -6,6 +6,7 @@
 //!
 //! Every cell's corners are checked to be right-handed. Cells of paths that cross each other are not looked for.
 
+use super::{MOST_CELLS, check_count};
 use crate::linalg::vector3::{add, cross, dot, subtract, times};
 use crate::mesh::length;
 use crate::mesh::mixed::MixedMesh;
@@ -20,9 +21,14 @@ pub struct Sweep {
     pub step: f64,
     /// Radius of the arcs that replace corners. Zero: the path's points are the sections.
     pub bend: f64,
-    /// Most cells allowed.
-    pub most: usize,
 }
+
+/// Shortest cell along a path, in widths. Well above what is welded.
+const SHORTEST: f64 = 1e-3;
+/// Farthest place from the origin, in widths: what is welded stays well above rounding.
+const FARTHEST: f64 = 1e9;
+/// A bend of less than half a step is one section where it also turns by less than this angle.
+const SLIGHT: f64 = 0.1;
 
 /// A place on a path with its unit tangent.
 type Station = ([f64; 3], [f64; 3]);
@@ -30,20 +36,25 @@ type Station = ([f64; 3], [f64; 3]);
 /// Sweeps every path. Points on a straight part of a path are sections too.
 ///
 /// # Errors
-/// No path, a path of fewer than two points or with equal neighbours, an arc that does not fit between its neighbours, a cell
-/// that is turned over, or too many cells.
+/// No path, a path of fewer than two points or with points too near each other or too far from the origin for the width, a
+/// step too small for it, an arc that does not fit between its neighbours, a cell that is turned over, or too many cells.
 pub fn sweep(paths: &[Vec<[f64; 3]>], sweep: Sweep) -> Result<MixedMesh, String> {
     if paths.is_empty() {
         return Err("no path is given; `paths` needs a list of lists of points".to_string());
+    }
+    let least = SHORTEST * sweep.width;
+    if sweep.bend > 0.0 && sweep.step < least {
+        return Err(format!(
+            "a step of {} is too short for a width of {}; give {least} or more",
+            sweep.step, sweep.width
+        ));
     }
     let mut mesh = MixedMesh::default();
     for (index, path) in paths.iter().enumerate() {
         let at = |reason: String| format!("path {index}: {reason}");
         let closed = path.len() > 3 && length(subtract(path[0], path[path.len() - 1])) <= 1e-9 * sweep.width;
         let stations = stations(path, closed, sweep).map_err(at)?;
-        if mesh.hexahedra.len() + stations.len() > sweep.most {
-            return Err(at(format!("more than {} cells; raise `step`", sweep.most)));
-        }
+        check_count(mesh.hexahedra.len() + stations.len(), COARSER).map_err(at)?;
         let frames = frames(&stations, closed);
         let first = mesh.points.len() as u32;
         for (&(place, tangent), &side) in stations.iter().zip(&frames) {
@@ -55,7 +66,9 @@ pub fn sweep(paths: &[Vec<[f64; 3]>], sweep: Sweep) -> Result<MixedMesh, String>
         }
         for section in 0..stations.len() as u32 - 1 {
             let cell: [u32; 8] = std::array::from_fn(|corner| first + 4 * section + corner as u32);
-            if !right_handed(&mesh.points, cell) {
+            let [from, to] = [section, section + 1].map(|section| stations[section as usize].0);
+            let least = SHORTEST * sweep.width * sweep.width * length(subtract(to, from));
+            if !right_handed(&mesh.points, cell, least) {
                 return Err(at(format!(
                     "the cell between section {section} and the next is turned over: the path bends too sharply for a width \
                      of {}; raise `bend` or lower `width`",
@@ -68,6 +81,9 @@ pub fn sweep(paths: &[Vec<[f64; 3]>], sweep: Sweep) -> Result<MixedMesh, String>
     weld(&mut mesh, 1e-6 * sweep.width);
     Ok(mesh)
 }
+
+/// What lowers the count of cells.
+const COARSER: &str = "raise `step`";
 
 fn blend(from: [f64; 3], to: [f64; 3], share: f64) -> [f64; 3] {
     add(from, times(subtract(to, from), share))
@@ -82,11 +98,24 @@ fn stations(path: &[[f64; 3]], closed: bool, sweep: Sweep) -> Result<Vec<Station
     if path.len() < 2 {
         return Err("it has fewer than two points".to_string());
     }
+    let far = |point: &[f64; 3]| !(length(*point) <= FARTHEST * sweep.width);
+    if let Some(point) = path.iter().position(far) {
+        return Err(format!(
+            "point {point} is so far from the origin that a width of {} is lost in rounding; move the paths nearer",
+            sweep.width
+        ));
+    }
+    let least = SHORTEST * sweep.width;
     let mut directions = Vec::with_capacity(path.len());
     for (index, pair) in path.windows(2).enumerate() {
         let along = subtract(pair[1], pair[0]);
-        if length(along) <= 1e-9 * sweep.width {
-            return Err(format!("points {index} and {} are the same", index + 1));
+        if length(along) < least {
+            return Err(format!(
+                "points {index} and {} are {} apart, too near each other for a width of {}",
+                index + 1,
+                length(along),
+                sweep.width
+            ));
         }
         directions.push(unit(along));
     }
@@ -111,7 +140,7 @@ fn stations(path: &[[f64; 3]], closed: bool, sweep: Sweep) -> Result<Vec<Station
             })
             .collect();
     }
-    // How far each point's arc reaches into the segments beside it.
+    // How far each point's arc turns and reaches into the segments beside it; a slight bend has none.
     let mut reaches = Vec::with_capacity(path.len());
     for point in 0..=last {
         let [before, after] = around(point);
@@ -119,14 +148,23 @@ fn stations(path: &[[f64; 3]], closed: bool, sweep: Sweep) -> Result<Vec<Station
         if turn > 3.1 {
             return Err(format!("it turns back on itself at point {point}"));
         }
-        reaches.push((turn, sweep.bend * (0.5 * turn).tan()));
+        let slight = turn < SLIGHT && sweep.bend * turn < 0.5 * sweep.step;
+        reaches.push(if slight {
+            (0.0, 0.0)
+        } else {
+            (turn, sweep.bend * (0.5 * turn).tan())
+        });
     }
-    let pieces = |size: f64| (size / sweep.step).round().clamp(1.0, sweep.most as f64) as usize;
+    let pieces = |size: f64| (size / sweep.step).round().clamp(1.0, MOST_CELLS as f64) as usize;
     let mut result: Vec<Station> = Vec::new();
-    if closed && reaches[0].0 > 1e-9 {
+    if closed && reaches[0].0 > 0.0 {
         return Err("it is closed and starts at a corner; start it on a straight part".to_string());
     }
-    result.push((path[0], directions[0]));
+    let mean = |point: usize| {
+        let [before, after] = around(point);
+        unit(add(before, after))
+    };
+    result.push((path[0], mean(0)));
     for segment in 0..last {
         let (from, to, along) = (path[segment], path[segment + 1], directions[segment]);
         let whole = length(subtract(to, from));
@@ -138,15 +176,29 @@ fn stations(path: &[[f64; 3]], closed: bool, sweep: Sweep) -> Result<Vec<Station
                 segment + 1
             ));
         }
-        if straight > 1e-6 * sweep.width {
+        let (turn, reach) = reaches[segment + 1];
+        // Arcs that meet leave no straight part.
+        if straight > 1e-9 * sweep.width {
+            if straight < least {
+                return Err(format!(
+                    "arcs of radius {} leave a straight part of {straight} between points {segment} and {}, too short for a \
+                     width of {}; change `bend` or move a point",
+                    sweep.bend,
+                    segment + 1,
+                    sweep.width
+                ));
+            }
             let count = pieces(straight);
-            for piece in 1..=count {
+            for piece in 1..count {
                 let at = reaches[segment].1 + straight * piece as f64 / count as f64;
                 result.push((blend(from, to, at / whole), along));
             }
+            result.push(match turn > 0.0 {
+                true => (blend(to, from, reach / whole), along),
+                false => (to, mean(segment + 1)),
+            });
         }
-        let (turn, reach) = reaches[segment + 1];
-        if turn > 1e-9 && segment + 1 < last {
+        if turn > 0.0 {
             let after = directions[segment + 1];
             let start = blend(to, from, reach / whole);
             // The unit vector from the start of the arc to its centre.
@@ -160,9 +212,7 @@ fn stations(path: &[[f64; 3]], closed: bool, sweep: Sweep) -> Result<Vec<Station
                 result.push((add(start, times(chord, sweep.bend)), tangent));
             }
         }
-        if result.len() > sweep.most {
-            return Err(format!("more than {} cells; raise `step`", sweep.most));
-        }
+        check_count(result.len(), COARSER)?;
     }
     Ok(result)
 }
@@ -211,8 +261,8 @@ fn reflected(vector: [f64; 3], normal: [f64; 3]) -> [f64; 3] {
     subtract(vector, times(normal, 2.0 * dot(normal, vector) / square))
 }
 
-/// Whether the three edges at every corner of a hexahedron span a positive volume.
-fn right_handed(points: &[[f64; 3]], cell: [u32; 8]) -> bool {
+/// Whether the three edges at every corner of a hexahedron span a volume of more than `least`.
+fn right_handed(points: &[[f64; 3]], cell: [u32; 8], least: f64) -> bool {
     let point = |corner: usize| points[cell[corner] as usize];
     (0..8).all(|corner| {
         let (base, turn) = (corner & 4, corner & 3);
@@ -223,7 +273,7 @@ fn right_handed(points: &[[f64; 3]], cell: [u32; 8]) -> bool {
             edge(corner ^ 4),
         ];
         let volume = dot(cross(x, y), z);
-        if base == 0 { volume > 0.0 } else { volume < 0.0 }
+        if base == 0 { volume > least } else { volume < -least }
     })
 }
 

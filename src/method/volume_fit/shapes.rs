@@ -82,7 +82,6 @@ pub fn generate(name: &str, parameters: &Value, wanted: usize) -> TriangleMesh {
                     width: 1.0,
                     step: 1.0,
                     bend: 1.0,
-                    most: usize::MAX,
                 },
             );
             quads_to_triangles(cut(volume.unwrap_or_default(), wanted, true))

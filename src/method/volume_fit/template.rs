@@ -9,7 +9,7 @@ use crate::fem::space::Space;
 use crate::mesh::TriangleMesh;
 use crate::mesh::format::{self, Content};
 use crate::mesh::mixed::{MixedMesh, Topology};
-use crate::mesh::template::{carve, collapse, extrude, grid, pillow, sweep, voxels};
+use crate::mesh::template::{carve, check_count, collapse, extrude, grid, pillow, sweep, voxels};
 use crate::mesh::{bounding_box, diagonal, generate};
 use crate::method::Failure;
 use crate::method::model::Part;
@@ -18,9 +18,6 @@ use serde_json::Value;
 fn invalid(reason: String) -> Failure {
     Failure::invalid(format!("template: {reason}"))
 }
-
-/// Most cells of a generated template.
-const MOST_CELLS: usize = 4_000_000;
 
 /// Reads or generates the template and follows its recipe.
 ///
@@ -38,11 +35,7 @@ pub fn read(part: &Part, target: Option<&Target>, notices: &mut Vec<String>) -> 
             let mesh = match generator.as_str() {
                 "grid" => {
                     let counts = [count("x", 4), count("y", 4), count("z", 4)];
-                    if counts.iter().product::<usize>() > MOST_CELLS {
-                        return Err(invalid(format!(
-                            "a grid of {counts:?} has more than {MOST_CELLS} cells"
-                        )));
-                    }
+                    check_count(counts.iter().product(), "lower `x`, `y` or `z`").map_err(invalid)?;
                     grid::grid(counts)
                 }
                 "voxels" => {
@@ -96,6 +89,7 @@ pub fn read(part: &Part, target: Option<&Target>, notices: &mut Vec<String>) -> 
             bytes,
             parameters,
         } => {
+            let scale = parameters.get("scale").and_then(Value::as_f64).unwrap_or(1.0);
             let mut mesh = if coefficient_file::sniff(bytes) {
                 let volume = coefficient_file::read(bytes).map_err(|reason| invalid(format!("{name}: {reason}")))?;
                 if parameters.get("recipe").is_some() {
@@ -110,8 +104,14 @@ pub fn read(part: &Part, target: Option<&Target>, notices: &mut Vec<String>) -> 
                 });
                 volume.mesh
             } else {
-                let content = format::read(name, bytes).map_err(|error| invalid(error.to_string()))?;
+                let mut content = format::read(name, bytes).map_err(|error| invalid(error.to_string()))?;
                 notices.extend(content.notices.iter().map(|notice| format!("template: {notice}")));
+                // Before a recipe, whose distances are those of the scaled mesh.
+                content
+                    .points
+                    .iter_mut()
+                    .flatten()
+                    .for_each(|coordinate| *coordinate *= scale);
                 let (mesh, found) = if is_surface(&content) {
                     taken = 1;
                     thickened(&content, parameters).map_err(invalid)?
@@ -121,8 +121,7 @@ pub fn read(part: &Part, target: Option<&Target>, notices: &mut Vec<String>) -> 
                 notices.extend(found.into_iter().map(|notice| format!("template: {notice}")));
                 mesh
             };
-            let scale = parameters.get("scale").and_then(Value::as_f64).unwrap_or(1.0);
-            if scale != 1.0 {
+            if map.is_some() {
                 transform(&mut mesh, &mut map, [scale; 3], [0.0; 3]);
             }
             (mesh, parameters, false)
@@ -181,7 +180,6 @@ fn swept(parameters: &Value) -> Result<MixedMesh, String> {
         width: number("width"),
         step: number("step"),
         bend: number("bend"),
-        most: MOST_CELLS,
     };
     sweep::sweep(&paths, sweep)
 }

@@ -66,7 +66,7 @@ fn a_fit_is_valid_falls_in_every_stage_and_is_the_same_with_any_number_of_thread
 fn the_surface_energy_of_concentric_spheres_and_its_gradient() {
     let sphere = json!({ "a": 1.0, "b": 1.0, "c": 1.0, "triangles": 20_000 });
     let mut target = target::read(&generated("ellipsoid", sphere)).unwrap();
-    target.place_sites();
+    target.place_sites(1000);
     let e = 0.05;
     let larger = target.surface.points.iter().map(|point| point.map(|x| (1.0 + e) * x));
     let samples: Vec<[f64; 3]> = larger.collect();
@@ -404,6 +404,8 @@ fn a_surface_file_is_extruded() {
         let flat = json!({ "recipe": [{ "op": "extrude", "distance": distance }] });
         assert!(reason(flat).contains("has no volume"));
     }
+    let other = json!({ "recipe": [{ "op": "extrude", "thickness": 0.5 }] });
+    assert!(reason(other).contains("extrude takes from, to, distance, layers, not `thickness`"));
     let many = json!({ "op": "extrude", "distance": 1.0, "layers": 1000 });
     assert!(reason(json!({ "recipe": vec![many; 3] })).contains("more than 4000000; lower `layers`"));
     // Scaled before it is extruded: distances are those of the scaled mesh.

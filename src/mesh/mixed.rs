@@ -7,7 +7,7 @@
 //! that every point of a cell has a positive Jacobian, or that distant cells do not overlap.
 
 use super::format::Content;
-use super::{TriangleMesh, cross, dot, subtract};
+use super::{TriangleMesh, connectivity, cross, dot, subtract};
 
 /// The kinds of cells a mixed mesh is made of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -502,6 +502,29 @@ impl Topology {
             }
         }
         Ok(())
+    }
+
+    /// Parts of the mesh that hang together by faces, and those that do by vertices: fewer where parts touch in an edge or
+    /// a vertex only.
+    pub fn bodies(&self) -> [usize; 2] {
+        let cells = self.cell_faces.len();
+        let pairs: Vec<[u32; 2]> = (self.faces.iter())
+            .map(|face| {
+                [
+                    face.cells[0],
+                    if face.on_boundary() {
+                        face.cells[0]
+                    } else {
+                        face.cells[1]
+                    },
+                ]
+            })
+            .collect();
+        let vertices = self.edges.iter().map(|edge| edge[1] as usize + 1).max().unwrap_or(0);
+        [
+            connectivity::components(&pairs, cells).count,
+            connectivity::components(&self.edges, vertices).count,
+        ]
     }
 
     /// The boundary as triangles, a quad as two.

@@ -68,6 +68,19 @@ pub fn thicken(
             return Err(format!("the face {face:?} (vertices from 0) names a vertex twice"));
         }
     }
+    let mut sides = std::collections::HashMap::new();
+    for (index, face) in faces.iter().enumerate() {
+        for (place, &corner) in face.iter().enumerate() {
+            let next = face[(place + 1) % face.len()];
+            if let Some(other) = sides.insert((corner, next), index) {
+                return Err(format!(
+                    "the faces {:?} and {face:?} (vertices from 0) both run from vertex {corner} to {next}, so they look to \
+                     opposite sides; turn one over",
+                    faces[other]
+                ));
+            }
+        }
+    }
     let inside = |face: &&Vec<u32>| within(centroid(points, face), region);
     let faces: Vec<Vec<u32>> = faces.iter().filter(inside).cloned().collect();
     if faces.is_empty() {

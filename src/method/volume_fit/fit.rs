@@ -110,8 +110,10 @@ impl<'a> Fit<'a> {
                 target.surface.cells.len()
             ));
         }
-        target.place_sites();
         let topology = volume.topology().map_err(Failure::invalid)?;
+        let order = settings.stages.iter().map(|stage| stage.order).max().unwrap_or(1);
+        let samples = induced_intervals(order).max(FEWEST_INTERVALS).pow(2);
+        target.place_sites((2 * samples * topology.boundary().count()).min(MOST_WANTED));
         let template_surface = topology.boundary_triangles(&volume.points);
         let own_volume = volume.volume();
         if !(own_volume > 0.0) {
@@ -267,12 +269,11 @@ impl<'a> Fit<'a> {
 
     /// Intervals between samples along an edge of the boundary.
     pub(super) fn intervals(&self, order: usize) -> usize {
-        let induced = if order == 1 { 1 } else { 2 * order - 2 };
         self.settings.samples.unwrap_or_else(|| {
             let faces = self.topology.boundary().count().max(1);
             let sites = self.target.sites.len().max(self.target.surface.cells.len());
             let even = (0.5 * sites as f64 / faces as f64).sqrt().ceil() as usize;
-            induced.max(even.clamp(2, 16))
+            induced_intervals(order).max(even.clamp(FEWEST_INTERVALS, 16))
         })
     }
 
@@ -429,6 +430,17 @@ fn check_target(
         ));
     }
     Ok(true)
+}
+
+/// Fewest intervals between samples along an edge, where none are given.
+const FEWEST_INTERVALS: usize = 2;
+
+/// Most sites that large triangles of the target are cut for.
+const MOST_WANTED: usize = 50_000;
+
+/// Intervals between samples along an edge that a quadrature of the order induces.
+fn induced_intervals(order: usize) -> usize {
+    if order == 1 { 1 } else { 2 * order - 2 }
 }
 
 /// Vertices less edges plus triangles, without points that no triangle uses.

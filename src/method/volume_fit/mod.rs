@@ -55,7 +55,7 @@ impl Method for VolumeFit {
     }
 
     fn version(&self) -> u32 {
-        10
+        11
     }
 
     fn summary(&self) -> &'static str {

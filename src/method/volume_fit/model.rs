@@ -51,7 +51,7 @@ static OPERATION: &[Field] = &[
         name: "distance",
         kind: Kind::Number { min: -1e9, max: 1e9 },
         default: Default::Absent,
-        doc: "Height of an extrusion, all layers together; 1 when absent.",
+        doc: "Height of an extrusion, all layers together, below 0 inward; 1 when absent.",
     },
     Field {
         name: "layers",
@@ -209,9 +209,10 @@ static KIND: LazyLock<ModelKind> = LazyLock::new(|| {
                     name: "paths",
                     kind: Kind::List(&PATH),
                     default: Default::Required,
-                    doc: "Paths of a square's centre, each a list of points, [x, y] or [x, y, z]. A path that ends where it starts is \
-                          closed. Points on straight parts are sections; a path that starts on the side of another's cell, \
-                          corner on corner, is joined to it.",
+                    doc: "Paths of a square's centre, each a list of points, [x, y, z] or [x, y] with z = 0, such as \
+                          [[[0, 0], [4, 0], [4, 4]]]. A path that ends where it starts is closed. Points on straight parts are \
+                          sections; a path that starts or ends on the side of another's cell, corner on corner, is joined to \
+                          it: give points there, as `bend` and `step` move the other sections.",
                 },
                 Field {
                     name: "width",

@@ -90,9 +90,13 @@ impl Fit<'_> {
         self.notices.extend(certificates.notices());
         let hausdorff = metrics["hausdorff"];
         if hausdorff > POOR && self.shell.is_none() {
+            let far = match self.settings.stages.first() {
+                Some(stage) if stage.lambda > 10.0 => ", lower lambda in the far phase",
+                _ => "",
+            };
             self.notices.push(format!(
                 "the fitted boundary and the target are up to {hausdorff:.1} % of the diagonal apart; raise the order or \
-                 iteration_limit, or use more elements"
+                 iteration_limit{far}, or use more elements or a template more like it"
             ));
         }
         let given: Vec<f64> = self

@@ -32,8 +32,12 @@ const CHANGE: f64 = 1e-6;
 /// Quadrature points a direction that every repair has more than the one before.
 const EXTRA: usize = 3;
 
-/// Where more than a few elements fail, the fit is made once more with so many times the points.
+/// Where mending was in vain the fit is made once more from its start, with so many times the points. Not at once: a fit
+/// that slips through a fold and is mended can end nearer the target than one that the barrier stops there.
 const AFRESH: usize = 3;
+
+/// Rounds before that.
+const PATIENCE: usize = 3;
 
 /// Quadrature points of the whole mesh at most for which that is done: it takes long.
 const MOST_POINTS: usize = 2_000_000;
@@ -215,7 +219,7 @@ impl Fit<'_> {
     }
 
     /// Mends elements that fail between the points: a few in their places, or else, and where that was in vain, by going
-    /// on with the whole fit, with more points. `Some` when the observer asked to stop.
+    /// on with the whole fit, with more points, or once from its start. `Some` when the observer asked to stop.
     pub(super) fn repair(&mut self, observer: &mut dyn Observer) -> Result<Option<StopReason>, Failure> {
         if self.settings.repairs == 0 {
             return Ok(None);
@@ -228,16 +232,21 @@ impl Fit<'_> {
         // The best so far; the rounds go on from where they are.
         let mut best = (certificates.clone(), self.space.clone(), self.x.clone());
         let mut in_place = false;
+        let usual = self.settings.quadrature_points(self.space.highest_order());
+        let cost = self.volume.cells() * (AFRESH * usual).pow(3);
+        let mut may_start_afresh = self.start.is_some() && cost <= MOST_POINTS;
+        let mut stuck = false;
         for round in 0..self.settings.repairs {
             let failing = certificates.failing();
             if failing.is_empty() || observer.stop().is_some() {
                 break;
             }
             observer.phase("repair");
-            in_place = !in_place && self.few(&failing);
-            let usual = self.settings.quadrature_points(self.space.highest_order());
-            let cost = self.volume.cells() * (AFRESH * usual).pow(3);
-            let afresh = round == 0 && !in_place && self.start.is_some() && cost <= MOST_POINTS;
+            in_place = !in_place && !stuck && self.few(&failing);
+            let afresh = may_start_afresh && !in_place && (stuck || round >= PATIENCE);
+            if afresh {
+                (may_start_afresh, stuck) = (false, false);
+            }
             self.extra_points += if afresh { (AFRESH - 1) * usual } else { EXTRA };
             let moved = if in_place {
                 repair(self, &failing, observer)?
@@ -256,10 +265,11 @@ impl Fit<'_> {
             }
             if dear || observer.stop().is_some() {
                 (certificates, self.space, self.x) = best.clone();
-                if in_place {
-                    continue;
+                stuck = !in_place && !afresh;
+                if stuck && !may_start_afresh {
+                    break;
                 }
-                break;
+                continue;
             }
             observer.phase("certify");
             certificates.renew(&moved, &self.space, &self.references, &self.x, observer);

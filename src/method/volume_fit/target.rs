@@ -114,7 +114,7 @@ pub fn of_boundary(surface: TriangleMesh) -> Target {
     Target {
         surface: surface.clone(),
         clean: surface,
-        notices: vec!["no target is given: the template's own boundary is the target".to_string()],
+        notices: vec!["no target is given: the template's own boundary, as it is, is the target".to_string()],
         ..Target::default()
     }
 }
@@ -216,16 +216,19 @@ fn centroids(surface: &TriangleMesh) -> Vec<[f64; 3]> {
     surface
         .cells
         .iter()
-        .map(|&cell| {
-            let [a, b, c] = surface.corners(cell);
-            std::array::from_fn(|axis| (a[axis] + b[axis] + c[axis]) / 3.0)
-        })
+        .map(|&cell| centroid(surface.corners(cell)))
         .collect()
 }
 
+fn centroid([a, b, c]: [[f64; 3]; 3]) -> [f64; 3] {
+    std::array::from_fn(|axis| (a[axis] + b[axis] + c[axis]) / 3.0)
+}
+
 impl Target {
-    /// Chooses the sites. Triangles without area have none.
-    pub fn place_sites(&mut self) {
+    /// Chooses the sites: the centroids of the triangles, of pieces where a triangle is large beside those that `wanted` even
+    /// ones would be. A flat face of two triangles would pull every sample near it towards two points. Triangles without
+    /// area have none.
+    pub fn place_sites(&mut self, wanted: usize) {
         if self.surface.cells.is_empty() {
             if self.sites.is_empty() {
                 self.sites = self.surface.points.clone();
@@ -234,18 +237,55 @@ impl Target {
             return;
         }
         let diagonal = mesh::diagonal(&self.surface.points);
+        let even = (4.0 / 3f64.sqrt() * self.surface.area() / wanted.max(1) as f64).sqrt();
+        let most = self.surface.cells.len() + MORE_SITES * wanted;
         let mut seen = std::collections::BTreeSet::new();
-        let centroids = centroids(&self.surface);
-        for (&cell, centroid) in self.surface.cells.iter().zip(centroids) {
-            let normal = mesh::area_vector(self.surface.corners(cell));
+        let mut pieces = Vec::new();
+        for &cell in &self.surface.cells {
+            let corners = self.surface.corners(cell);
+            let normal = mesh::area_vector(corners);
             let size = mesh::length(normal);
-            // Two sites at one place share a cell of no use.
-            if size > 1e-14 * diagonal * diagonal && seen.insert(centroid.map(f64::to_bits)) {
-                self.sites.push(centroid);
-                self.normals.push(normal.map(|coordinate| coordinate / size));
+            if !(size > 1e-14 * diagonal * diagonal) {
+                continue;
+            }
+            let normal = normal.map(|coordinate| coordinate / size);
+            pieces.push(corners);
+            while let Some(piece) = pieces.pop() {
+                let (place, longest) = longest_edge(piece);
+                if longest > LARGE * even && self.sites.len() + pieces.len() < most {
+                    pieces.extend(halved(piece, place));
+                    continue;
+                }
+                let centroid = centroid(piece);
+                // Two sites at one place share a cell of no use.
+                if seen.insert(centroid.map(f64::to_bits)) {
+                    self.sites.push(centroid);
+                    self.normals.push(normal);
+                }
             }
         }
     }
+}
+
+/// Edges so many times longer than those of an even triangulation are halved.
+const LARGE: f64 = 2.0;
+
+/// Sites that may be added for every one wanted: slivers have many.
+const MORE_SITES: usize = 4;
+
+/// The edge after which corner is the longest, and its length.
+fn longest_edge(corners: [[f64; 3]; 3]) -> (usize, f64) {
+    let edge = |place: usize| mesh::length(mesh::subtract(corners[(place + 1) % 3], corners[place]));
+    (0..3)
+        .map(|place| (place, edge(place)))
+        .fold((0, 0.0), |best, next| if next.1 > best.1 { next } else { best })
+}
+
+/// Both halves of a triangle, cut from the middle of the edge after a corner.
+fn halved(corners: [[f64; 3]; 3], place: usize) -> [[[f64; 3]; 3]; 2] {
+    let [a, b, c] = [0, 1, 2].map(|step| corners[(place + step) % 3]);
+    let middle = std::array::from_fn(|axis| 0.5 * (a[axis] + b[axis]));
+    [[a, middle, c], [middle, b, c]]
 }
 
 /// Numbers in [0, 1) from a seed (a linear congruential generator and a mix).

@@ -131,7 +131,17 @@ pub fn read(part: &Part, target: Option<&Target>, notices: &mut Vec<String>) -> 
     for (step, operation) in recipe.into_iter().flatten().enumerate().skip(taken) {
         mesh = apply(&mesh, operation).map_err(|reason| invalid(format!("step {step} of the recipe: {reason}")))?;
     }
-    mesh.topology().map_err(invalid)?;
+    let [by_faces, by_vertices] = mesh.topology().map_err(invalid)?.bodies();
+    if by_vertices > 1 && shell.is_none() {
+        notices.push(format!(
+            "the template is {by_vertices} bodies that nothing joins; cells are neighbours where all corners of a face are shared"
+        ));
+    }
+    if by_faces > by_vertices {
+        notices.push(format!(
+            "the template is {by_faces} bodies joined by faces, of which some touch in an edge or a vertex only"
+        ));
+    }
     let place = parameters.get("place").and_then(Value::as_str);
     if let Some(target) = target {
         lay(
@@ -249,6 +259,23 @@ impl Operation<'_> {
         self.0.get("op").and_then(Value::as_str).unwrap_or_default()
     }
 
+    /// Whether it takes everything that is given.
+    fn check(&self) -> Result<(), String> {
+        let taken: &[&str] = match self.name() {
+            "carve" => &["from", "to"],
+            "extrude" => &["from", "to", "distance", "layers"],
+            "pillow" => &["thickness"],
+            _ => &["from", "to", "axis"],
+        };
+        let given = self.0.as_object().into_iter().flatten();
+        for (name, value) in given.filter(|(name, _)| *name != "op") {
+            if !value.is_null() && !taken.contains(&name.as_str()) {
+                return Err(format!("{} takes {}, not `{name}`", self.name(), taken.join(", ")));
+            }
+        }
+        Ok(())
+    }
+
     fn number(&self, name: &str, default: f64) -> f64 {
         self.0.get(name).and_then(Value::as_f64).unwrap_or(default)
     }
@@ -277,6 +304,7 @@ impl Operation<'_> {
 /// One operation of a recipe.
 fn apply(mesh: &MixedMesh, operation: &Value) -> Result<MixedMesh, String> {
     let operation = Operation(operation);
+    operation.check()?;
     let region = operation.region()?;
     match operation.name() {
         "carve" if !operation.has_box() => Err("carving needs a box: give `from` and `to`".to_string()),
@@ -315,6 +343,7 @@ fn thickened(content: &Content, parameters: &Value) -> Result<(MixedMesh, Vec<St
         .chain(content.quads.iter().map(|face| face.to_vec()))
         .collect();
     let at = |reason: String| format!("step 0 of the recipe: {reason}");
+    operation.check().map_err(at)?;
     let region = operation.region().map_err(at)?;
     let distance = operation.number("distance", 1.0);
     let mesh = extrude::thicken(&content.points, &faces, region, distance, operation.layers()).map_err(at)?;

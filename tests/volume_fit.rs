@@ -119,6 +119,56 @@ fn an_inverted_mesh_is_repaired_over_its_own_boundary() {
     assert!(outcome.metrics["hausdorff"] < 5.0, "{}", outcome.metrics["hausdorff"]);
 }
 
+/// The boundary of a bent bar as it is, two triangles a face: with one site on each, samples were drawn to their middles.
+#[test]
+fn a_bar_keeps_its_flat_faces() {
+    let paths = json!([[[0, 0], [2, 0], [2, 2]]]);
+    let settings = json!({ "order": 3, "lambda_far": 0.0 });
+    let outcome = fit(
+        json!({ "generate": "sweep", "paths": paths, "bend": 1.0 }),
+        None,
+        settings,
+    )
+    .unwrap();
+    let metric = |name: &str| outcome.metrics[name];
+    assert_eq!((metric("elements"), metric("certified")), (4.0, 4.0));
+    assert!(metric("hausdorff") < 0.3, "{}", metric("hausdorff"));
+    assert!(metric("energy_surface") < 1e-3, "{}", metric("energy_surface"));
+    assert!(metric("scaled_jacobian_min") > 0.7, "{}", metric("scaled_jacobian_min"));
+}
+
+#[test]
+fn sites_are_as_even_as_wanted() {
+    // Two triangles of a square and a sliver of no area.
+    let mut target = target::of_boundary(TriangleMesh {
+        points: vec![
+            [0.0; 3],
+            [1.0, 0.0, 0.0],
+            [1.0, 1.0, 0.0],
+            [0.0, 1.0, 0.0],
+            [2.0, 0.0, 0.0],
+        ],
+        cells: vec![[0, 1, 2], [0, 2, 3], [0, 1, 4]],
+    });
+    target.place_sites(1000);
+    let sites = target.sites.len();
+    assert!((400..4000).contains(&sites), "{sites}");
+    // Every place of the square has a site near it, in its plane.
+    for step in 0..400 {
+        let place = [(step % 20) as f64 / 19.0, (step / 20) as f64 / 19.0];
+        let near = target
+            .sites
+            .iter()
+            .map(|site| (site[0] - place[0]).hypot(site[1] - place[1]));
+        assert!(near.fold(f64::INFINITY, f64::min) < 0.07);
+    }
+    assert!(target.normals.iter().all(|normal| *normal == [0.0, 0.0, 1.0]));
+    // As few as there are triangles where no more are wanted.
+    let mut coarse = target::of_boundary(target.surface.clone());
+    coarse.place_sites(2);
+    assert_eq!(coarse.sites.len(), 2);
+}
+
 #[test]
 fn elements_that_fail_between_quadrature_points_are_mended() {
     // Too few points: a few elements of many fail, or nearly all of a few.
@@ -351,6 +401,13 @@ fn squares_swept_along_paths_join_and_close() {
     let slight = sweep(&[flat(&[[0.0, 0.0], [1.0, 0.0], [3.0, 0.01]])], settings).unwrap();
     assert_eq!(slight.cells(), 3);
     assert!((figures(&slight).1 - 3.0).abs() < 1e-3);
+    // Bodies beside each other, and two that touch in an edge.
+    let bodies = |mesh: &MixedMesh| mesh.topology().unwrap().bodies();
+    assert_eq!((bodies(&joined), bodies(&alone)), ([1, 1], [1, 1]));
+    let across = flat(&[[0.0, 9.0], [6.0, 9.0]]);
+    assert_eq!(bodies(&sweep(&[hook, across], settings).unwrap()), [2, 2]);
+    let edge = [flat(&[[0.0, 0.0], [1.0, 0.0]]), flat(&[[1.0, 1.0], [2.0, 1.0]])];
+    assert_eq!(bodies(&sweep(&edge, settings).unwrap()), [2, 1]);
     // What cannot be swept is named.
     let refused = |path: &[[f64; 2]], settings: Sweep| sweep(&[flat(path)], settings).unwrap_err();
     assert!(sweep(&[], settings).unwrap_err().contains("no path is given"));
@@ -411,6 +468,14 @@ fn a_surface_file_is_extruded() {
     // Scaled before it is extruded: distances are those of the scaled mesh.
     let scaled = json!({ "scale": 2.0, "recipe": [{ "op": "extrude", "distance": 1.0 }] });
     assert!((figures(&read(scaled).unwrap().mesh).1 - 10.0).abs() < 1e-12);
+    let mut notices = Vec::new();
+    let turned = Part::File {
+        name: "turned.obj".to_string(),
+        bytes: b"v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 2 0 0\nv 2 1 0\nf 1 2 3 4\nf 3 6 5 2\n".to_vec(),
+        parameters: json!({ "recipe": [{ "op": "extrude" }] }),
+    };
+    let refused = template::read(&turned, None, &mut notices).err().unwrap().reason;
+    assert!(refused.contains("both run from vertex 1 to 2"), "{refused}");
     let empty = json!({ "recipe": [{ "op": "extrude", "from": [9, 9, 9], "to": [10, 10, 10] }] });
     assert!(reason(empty).contains("no triangle or quad has its centroid"));
 }

@@ -40,7 +40,7 @@ const AFRESH: usize = 3;
 const PATIENCE: usize = 3;
 
 /// Quadrature points of the whole mesh at most for which that is done: it takes long.
-const MOST_POINTS: usize = 2_000_000;
+const MOST_POINTS: usize = 1_000_000;
 
 /// A map with fewer failing elements is not taken when its surface energy is so many times higher, and by more than the
 /// volume energy weighs. That one itself is of no use here: where elements fail, its points were too few to measure it.

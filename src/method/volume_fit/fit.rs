@@ -113,8 +113,7 @@ impl<'a> Fit<'a> {
         let topology = volume.topology().map_err(Failure::invalid)?;
         let order = settings.stages.iter().map(|stage| stage.order).max().unwrap_or(1);
         let samples = induced_intervals(order).max(FEWEST_INTERVALS).pow(2);
-        let enough = target.surface.cells.len().max(ENOUGH_SITES);
-        target.place_sites((2 * samples * topology.boundary().count()).min(enough));
+        target.place_sites(2 * samples * topology.boundary().count());
         let template_surface = topology.boundary_triangles(&volume.points);
         let own_volume = volume.volume();
         if !(own_volume > 0.0) {
@@ -435,9 +434,6 @@ fn check_target(
 
 /// Fewest intervals between samples along an edge, where none are given.
 const FEWEST_INTERVALS: usize = 2;
-
-/// Sites that are enough for a target of fewer triangles, however many samples there are.
-const ENOUGH_SITES: usize = 3_000;
 
 /// Intervals between samples along an edge that a quadrature of the order induces.
 fn induced_intervals(order: usize) -> usize {

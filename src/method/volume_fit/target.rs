@@ -225,9 +225,9 @@ fn centroid([a, b, c]: [[f64; 3]; 3]) -> [f64; 3] {
 }
 
 impl Target {
-    /// Chooses the sites: the centroids of the triangles, of pieces where a triangle is large beside those that `wanted` even
-    /// ones would be. A flat face of two triangles would pull every sample near it towards two points. Triangles without
-    /// area have none.
+    /// Chooses the sites: the centroids of the triangles, or of pieces of those that are large beside `wanted` even ones. A
+    /// flat face of two triangles would pull every sample near it towards two points. Wanted are never more than there are
+    /// triangles or [`ENOUGH_SITES`]. Triangles without area have none.
     pub fn place_sites(&mut self, wanted: usize) {
         if self.surface.cells.is_empty() {
             if self.sites.is_empty() {
@@ -237,17 +237,18 @@ impl Target {
             return;
         }
         let diagonal = mesh::diagonal(&self.surface.points);
-        let even = (4.0 / 3f64.sqrt() * self.surface.area() / wanted.max(1) as f64).sqrt();
-        let most = self.surface.cells.len() + MORE_SITES * wanted;
+        let area = |&cell: &[u32; 3]| mesh::area_vector(self.surface.corners(cell));
+        let has_area = |cell: &&[u32; 3]| mesh::length(area(cell)) > 1e-14 * diagonal * diagonal;
+        let sound: Vec<[u32; 3]> = self.surface.cells.iter().filter(has_area).copied().collect();
+        let wanted = wanted.clamp(1, sound.len().max(ENOUGH_SITES));
+        let even = (4.0 / 3f64.sqrt() * self.surface.area() / wanted as f64).sqrt();
+        let most = sound.len() + MORE_SITES * wanted;
         let mut seen = std::collections::BTreeSet::new();
         let mut pieces = Vec::new();
-        for &cell in &self.surface.cells {
+        for cell in sound {
             let corners = self.surface.corners(cell);
             let normal = mesh::area_vector(corners);
             let size = mesh::length(normal);
-            if !(size > 1e-14 * diagonal * diagonal) {
-                continue;
-            }
             let normal = normal.map(|coordinate| coordinate / size);
             pieces.push(corners);
             while let Some(piece) = pieces.pop() {
@@ -269,6 +270,9 @@ impl Target {
 
 /// Edges so many times longer than those of an even triangulation are halved.
 const LARGE: f64 = 2.0;
+
+/// Sites that are enough for a target of fewer triangles, however many samples there are.
+const ENOUGH_SITES: usize = 3_000;
 
 /// Sites that may be added for every one wanted: slivers have many.
 const MORE_SITES: usize = 4;

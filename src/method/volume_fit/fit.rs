@@ -271,8 +271,7 @@ impl<'a> Fit<'a> {
     pub(super) fn intervals(&self, order: usize) -> usize {
         self.settings.samples.unwrap_or_else(|| {
             let faces = self.topology.boundary().count().max(1);
-            let sites = self.target.sites.len().max(self.target.surface.cells.len());
-            let even = (0.5 * sites as f64 / faces as f64).sqrt().ceil() as usize;
+            let even = (0.5 * self.target.sites.len() as f64 / faces as f64).sqrt().ceil() as usize;
             induced_intervals(order).max(even.clamp(FEWEST_INTERVALS, 16))
         })
     }
@@ -394,15 +393,15 @@ fn check_target(
     is_shell: bool,
     notices: &mut Vec<String>,
 ) -> Result<bool, Failure> {
+    if target.sites.is_empty() {
+        return Err(Failure::invalid("every triangle of the target has no area"));
+    }
     if target.surface.cells.is_empty() {
         notices.push(format!(
             "the target is a cloud of {} points without normals: only the term from the template to the points is there",
             target.sites.len()
         ));
         return Ok(false);
-    }
-    if target.sites.is_empty() {
-        return Err(Failure::invalid("every triangle of the target has no area"));
     }
     let closure = Closure::of(&target.surface);
     let volume = target.surface.enclosed_volume();

@@ -55,7 +55,7 @@ impl Method for VolumeFit {
     }
 
     fn version(&self) -> u32 {
-        11
+        12
     }
 
     fn summary(&self) -> &'static str {

@@ -225,9 +225,9 @@ fn centroid([a, b, c]: [[f64; 3]; 3]) -> [f64; 3] {
 }
 
 impl Target {
-    /// Chooses the sites: the centroids of the triangles, or of pieces of those that are large beside `wanted` even ones. A
-    /// flat face of two triangles would pull every sample near it towards two points. Wanted are never more than there are
-    /// triangles or [`ENOUGH_SITES`]. Triangles without area have none.
+    /// Leaves out triangles without area and chooses the sites: the centroids of the triangles, or of pieces of those that
+    /// are large beside `wanted` even ones. A flat face of two triangles would pull every sample near it towards two points.
+    /// Wanted are never more than there are triangles or [`ENOUGH_SITES`].
     pub fn place_sites(&mut self, wanted: usize) {
         if self.surface.cells.is_empty() {
             if self.sites.is_empty() {
@@ -237,15 +237,16 @@ impl Target {
             return;
         }
         let diagonal = mesh::diagonal(&self.surface.points);
-        let area = |&cell: &[u32; 3]| mesh::area_vector(self.surface.corners(cell));
-        let has_area = |cell: &&[u32; 3]| mesh::length(area(cell)) > 1e-14 * diagonal * diagonal;
-        let sound: Vec<[u32; 3]> = self.surface.cells.iter().filter(has_area).copied().collect();
-        let wanted = wanted.clamp(1, sound.len().max(ENOUGH_SITES));
+        let mut cells = std::mem::take(&mut self.surface.cells);
+        cells.retain(|&cell| mesh::length(mesh::area_vector(self.surface.corners(cell))) > 1e-14 * diagonal * diagonal);
+        self.surface.cells = cells;
+        let count = self.surface.cells.len();
+        let wanted = wanted.clamp(1, count.max(ENOUGH_SITES));
         let even = (4.0 / 3f64.sqrt() * self.surface.area() / wanted as f64).sqrt();
-        let most = sound.len() + MORE_SITES * wanted;
+        let most = count + MORE_SITES * wanted;
         let mut seen = std::collections::BTreeSet::new();
         let mut pieces = Vec::new();
-        for cell in sound {
+        for &cell in &self.surface.cells {
             let corners = self.surface.corners(cell);
             let normal = mesh::area_vector(corners);
             let size = mesh::length(normal);
